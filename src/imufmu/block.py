@@ -1,0 +1,325 @@
+"""What a block is: a declaration, and the CasADi Functions that everything else is derived from.
+
+Two kinds. A **sampled** block (IMU, estimator) advances at multiples of its parameter ``sample_period``:
+
+    initial(u, p) -> state        the first sample
+    step(x, u, p) -> state        every further sample
+    output(x, u, p) -> outputs and locals, after either
+
+A **continuous** block (plant) is integrated by RK4 with steps no longer than its parameter ``max_step``:
+
+    initial(p) -> state
+    dynamics(x, u, p, t) -> time derivative of the state
+    output(x, u, p, t) -> outputs and locals
+
+x, u, p are namespaces of CasADi SX expressions with the declared names and shapes; functions return dicts by name.
+
+Inputs never carry NaN or infinity into the equations. An input with a non-finite element counts as missing: the block
+keeps the last finite vector (at first the start value). For an input ``gyro`` a sampled block sees
+
+    u.gyro            this sample, or the last finite one
+    u.gyro_previous   the same, one sample ago
+    u.gyro_missing    1 where this sample was not finite, else 0
+
+``u.normal`` holds the block's standard normal draws of this sample, where it declares any.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from types import SimpleNamespace
+from typing import Any, Literal
+
+import casadi as ca
+import numpy as np
+
+from . import vocabulary
+from .noise import standard_normal
+from .signals import DeclarationError, Parameter, Shape, Signal, State, total_size
+
+LARGEST_INPUT = 1e100  # larger magnitudes count as not finite: their squares would overflow
+
+Expressions = Mapping[str, Any]
+
+
+class ParameterError(ValueError):
+    """Parameter values out of bounds, or unknown; the message names each."""
+
+
+@dataclass(frozen=True)
+class Variable:
+    """One scalar variable of a block, in the order of every interface: inputs, parameters, outputs, locals."""
+
+    name: str
+    signal: Signal
+    group: Literal["input", "parameter", "output", "local"]
+    index: int  # position in the flat vector of its group
+    start: float
+
+
+@dataclass(frozen=True)
+class Block:
+    """Common part of both kinds of block. ``doc`` is the text for its users, ``reference`` the paper."""
+
+    name: str
+    summary: str
+    doc: str
+    reference: str
+    inputs: tuple[Signal, ...]
+    outputs: tuple[Signal, ...]
+    locals: tuple[Signal, ...]
+    own_parameters: tuple[Parameter, ...]
+    state: tuple[State, ...]
+    output: Callable[..., Expressions]
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """Every parameter: the framework's first."""
+        return (*self._framework_parameters(), *self.own_parameters)
+
+    def _framework_parameters(self) -> tuple[Parameter, ...]:
+        raise DeclarationError(f"{self.name}: a block is a SampledBlock or a ContinuousBlock")
+
+    @property
+    def reported(self) -> tuple[Signal, ...]:
+        """Every signal the block reports: outputs, then locals."""
+        return (*self.outputs, *self.locals)
+
+    @cached_property
+    def variables(self) -> tuple[Variable, ...]:
+        """The flat, scalar view of the block."""
+        found: list[Variable] = []
+        groups: tuple[tuple[Literal["input", "parameter", "output", "local"], tuple[Signal, ...]], ...] = (
+            ("input", self.inputs),
+            ("parameter", self.parameters),
+            ("output", self.outputs),
+            ("local", self.locals),
+        )
+        for group, signals in groups:
+            elements = [(s, n, v) for s in signals for n, v in zip(s.element_names(), s.start_values(), strict=True)]
+            # Locals follow the outputs in the vector of reported signals.
+            shift = total_size(self.outputs) if group == "local" else 0
+            found += [Variable(name, signal, group, shift + i, v) for i, (signal, name, v) in enumerate(elements)]
+        names = [variable.name for variable in found]
+        twice = {name for name in names if names.count(name) > 1}
+        if twice:
+            raise DeclarationError(f"{self.name}: declared twice: {', '.join(sorted(twice))}")
+        return tuple(found)
+
+    @cached_property
+    def held_state(self) -> tuple[State, ...]:
+        """The block's own state, then the last finite value of every input."""
+        return (*self.state, *(State(f"held_{s.name}", s.shape) for s in self.inputs))
+
+    def start_vector(self, signals: Sequence[Signal]) -> np.ndarray:
+        """Start values of the signals, flat."""
+        return np.array([value for signal in signals for value in signal.start_values()])
+
+    def parameter_vector(self, values: Mapping[str, Any] | None = None) -> np.ndarray:
+        """Flat parameter vector from values by name: of a whole parameter (``mount``) or an element (``mount[2]``).
+
+        Raises ParameterError naming every unknown name, wrong size and value out of bounds.
+        """
+        p = self.start_vector(self.parameters)
+        places = {v.name: slice(v.index, v.index + 1) for v in self.variables if v.group == "parameter"}
+        first = 0
+        for parameter in self.parameters:
+            places[parameter.name] = slice(first, first + parameter.size)
+            first += parameter.size
+        problems = []
+        for name, value in (values or {}).items():
+            if name not in places:
+                problems.append(f"{name}: unknown; {self.name} has {', '.join(q.name for q in self.parameters)}")
+                continue
+            flat = np.asarray(value, dtype=float).reshape(-1)
+            if flat.size not in (1, places[name].stop - places[name].start):
+                problems.append(f"{name}: {flat.size} values for {places[name].stop - places[name].start} elements")
+                continue
+            p[places[name]] = flat
+        problems += self.parameter_problems(p)
+        if problems:
+            raise ParameterError(f"{self.name}: " + "; ".join(problems))
+        return p
+
+    def parameter_problems(self, p: np.ndarray) -> list[str]:
+        """One line per element of the flat parameter vector that is out of bounds or of the wrong kind."""
+        problems = []
+        for variable in self.variables:
+            if variable.group != "parameter":
+                continue
+            value, declared = p[variable.index], variable.signal
+            if not declared.minimum <= value <= declared.maximum:
+                unit = "" if declared.unit == "1" else f" {declared.unit}"
+                problems.append(
+                    f"{variable.name} = {value:g}{unit} is outside [{declared.minimum:g}, {declared.maximum:g}]{unit}"
+                )
+            elif isinstance(declared, Parameter) and declared.kind != "real" and value != round(value):
+                problems.append(f"{variable.name} = {value:g} is not a whole number")
+        return problems
+
+    def _symbols(self, name: str, items: Sequence[Signal | State]) -> Any:
+        return ca.SX.sym(name, total_size(items))
+
+    def _with_held_inputs(self, raw: Any, held: Any) -> tuple[SimpleNamespace, list[Any]]:
+        """Namespace of finite inputs, and their flat values for the next step."""
+        u, values, first = SimpleNamespace(), [], 0
+        for signal in self.inputs:
+            part = slice(first, first + signal.size)
+            finite = ca.mmin(ca.fabs(raw[part]) <= LARGEST_INPUT)
+            value = ca.if_else(finite, raw[part], held[part])
+            setattr(u, signal.name, _shaped(value, signal.shape))
+            setattr(u, f"{signal.name}_previous", _shaped(held[part], signal.shape))
+            setattr(u, f"{signal.name}_missing", 1 - finite)
+            values.append(value)
+            first += signal.size
+        return u, values
+
+    def _flatten(self, what: str, items: Sequence[Signal | State], values: Expressions) -> Any:
+        """Flat column of the named expressions, checked against the declaration."""
+        expected = {item.name for item in items}
+        if set(values) != expected:
+            raise DeclarationError(f"{self.name}.{what} must return {sorted(expected)}, returned {sorted(values)}")
+        columns = []
+        for item in items:
+            value = ca.SX(values[item.name])
+            if value.numel() != item.size:
+                raise DeclarationError(f"{self.name}.{what}: {item.name} has {value.numel()} elements, not {item.size}")
+            columns.append(ca.vec(value.T) if len(item.shape) == 2 else ca.vec(value))
+        return ca.densify(ca.vertcat(*columns))
+
+
+@dataclass(frozen=True)
+class SampledBlock(Block):
+    """A block that advances at multiples of ``sample_period`` (default ``period``, s)."""
+
+    initial: Callable[..., Expressions]
+    step: Callable[..., Expressions]
+    period: float = 0.01
+    normals: int = 0  # standard normal draws per sample
+
+    def _framework_parameters(self) -> tuple[Parameter, ...]:
+        period = vocabulary.sample_period(self.period)
+        return (period, vocabulary.SEED) if self.normals else (period,)
+
+    @cached_property
+    def first_function(self) -> Any:
+        """CasADi Function (u, p, w) -> (x, y): the first sample; w are ``normals`` uniform draws."""
+        u, p, w = self._arguments()
+        held = self.start_vector(self.inputs)
+        inputs, finite = self._inputs(u, ca.DM(held), w)
+        x = self._flatten("initial", self.state, self.initial(inputs, _namespace(self.parameters, p)))
+        y = self._outputs(x, inputs, p)
+        return ca.Function(f"{self.name}_first", [u, p, w], [ca.vertcat(x, *finite), y], ["u", "p", "w"], ["x", "y"])
+
+    @cached_property
+    def next_function(self) -> Any:
+        """CasADi Function (x, u, p, w) -> (x, y): every further sample."""
+        u, p, w = self._arguments()
+        x_all = self._symbols("x", self.held_state)
+        n = total_size(self.state)
+        inputs, finite = self._inputs(u, x_all[n:], w)
+        state = _namespace(self.state, x_all[:n])
+        x = self._flatten("step", self.state, self.step(state, inputs, _namespace(self.parameters, p)))
+        y = self._outputs(x, inputs, p)
+        result = [ca.vertcat(x, *finite), y]
+        return ca.Function(f"{self.name}_next", [x_all, u, p, w], result, ["x", "u", "p", "w"], ["x_next", "y"])
+
+    @cached_property
+    def output_function(self) -> Any:
+        """CasADi Function (x, u, p, w) -> (y): what a state that was just reached reports; x without held inputs."""
+        u, p, w = self._arguments()
+        x = self._symbols("x", self.state)
+        inputs, _ = self._inputs(u, ca.DM(self.start_vector(self.inputs)), w)
+        y = self._outputs(x, inputs, p)
+        return ca.Function(f"{self.name}_output", [x, u, p, w], [y], ["x", "u", "p", "w"], ["y"])
+
+    def _arguments(self) -> tuple[Any, Any, Any]:
+        u, p = self._symbols("u", self.inputs), self._symbols("p", self.parameters)
+        return u, p, ca.SX.sym("w", self.normals)
+
+    def _inputs(self, u: Any, held: Any, w: Any) -> tuple[SimpleNamespace, list[Any]]:
+        inputs, finite = self._with_held_inputs(u, held)
+        if self.normals:
+            inputs.normal = standard_normal(w)
+        return inputs, finite
+
+    def _outputs(self, x: Any, inputs: SimpleNamespace, p: Any) -> Any:
+        parameters = _namespace(self.parameters, p)
+        return self._flatten("output", self.reported, self.output(_namespace(self.state, x), inputs, parameters))
+
+
+@dataclass(frozen=True)
+class ContinuousBlock(Block):
+    """A block integrated by RK4 with steps no longer than ``max_step`` (default ``longest_step``, s)."""
+
+    initial: Callable[..., Expressions]
+    dynamics: Callable[..., Expressions]
+    longest_step: float = 1e-3
+
+    def _framework_parameters(self) -> tuple[Parameter, ...]:
+        return (vocabulary.max_step(self.longest_step),)
+
+    @cached_property
+    def initial_function(self) -> Any:
+        """CasADi Function (p) -> (x)."""
+        p = self._symbols("p", self.parameters)
+        x = self._flatten("initial", self.state, self.initial(_namespace(self.parameters, p)))
+        held = ca.DM(self.start_vector(self.inputs))
+        return ca.Function(f"{self.name}_initial", [p], [ca.vertcat(x, held)], ["p"], ["x"])
+
+    @cached_property
+    def advance_function(self) -> Any:
+        """CasADi Function (x, u, p, t, h) -> (x): one RK4 step of h from t, inputs held."""
+        x_all, u, p = self._vectors()
+        t, h = ca.SX.sym("t"), ca.SX.sym("h")
+        n = total_size(self.state)
+        inputs, finite = self._with_held_inputs(u, x_all[n:])
+        parameters = _namespace(self.parameters, p)
+
+        def slope(state: Any, time: Any) -> Any:
+            derivative = self.dynamics(_namespace(self.state, state), inputs, parameters, time)
+            return self._flatten("dynamics", self.state, derivative)
+
+        x = x_all[:n]
+        k1 = slope(x, t)
+        k2 = slope(x + h / 2 * k1, t + h / 2)
+        k3 = slope(x + h / 2 * k2, t + h / 2)
+        k4 = slope(x + h * k3, t + h)
+        x_next = x + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
+        names = ["x", "u", "p", "t", "h"]
+        return ca.Function(
+            f"{self.name}_advance", [x_all, u, p, t, h], [ca.vertcat(x_next, *finite)], names, ["x_next"]
+        )
+
+    @cached_property
+    def output_function(self) -> Any:
+        """CasADi Function (x, u, p, t) -> (y)."""
+        x_all, u, p = self._vectors()
+        t = ca.SX.sym("t")
+        n = total_size(self.state)
+        inputs, _ = self._with_held_inputs(u, x_all[n:])
+        values = self.output(_namespace(self.state, x_all[:n]), inputs, _namespace(self.parameters, p), t)
+        y = self._flatten("output", self.reported, values)
+        return ca.Function(f"{self.name}_output", [x_all, u, p, t], [y], ["x", "u", "p", "t"], ["y"])
+
+    def _vectors(self) -> tuple[Any, Any, Any]:
+        return (
+            self._symbols("x", self.held_state),
+            self._symbols("u", self.inputs),
+            self._symbols("p", self.parameters),
+        )
+
+
+def _shaped(flat: Any, shape: Shape) -> Any:
+    """Flat row-by-row column as an expression of the declared shape."""
+    return ca.reshape(flat, shape[1], shape[0]).T if len(shape) == 2 else flat
+
+
+def _namespace(items: Sequence[Signal | State], flat: Any) -> SimpleNamespace:
+    result, first = SimpleNamespace(), 0
+    for item in items:
+        setattr(result, item.name, _shaped(flat[first : first + item.size], item.shape))
+        first += item.size
+    return result

@@ -1,0 +1,225 @@
+"""A block at work: flat buffers, time, state. The FMU adapters and the streaming object stand on it.
+
+Times are seconds. A sampled block processes every instant t_k = start_time + k sample_period in [t, t + h) of a step
+(t, h) with the inputs in force and holds its outputs between; k is a whole number. A continuous block integrates over
+[t, t + h] with the inputs held and reports its outputs at the end, with the inputs in force there.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from .block import Block, ContinuousBlock, ParameterError, SampledBlock
+from .noise import uniforms
+from .signals import total_size
+
+CLOCK_TOLERANCE = 1e-6  # of a sample: a step that ends this little after an instant does not contain it
+LONGEST_STEP = 10**8  # samples or solver steps in one step; more is taken for a wrong unit or a broken time
+_DRAWS_AHEAD = 256  # samples whose noise is drawn in one go
+
+
+class StepError(ValueError):
+    """An impossible step; nothing has changed."""
+
+
+def buffered(function: Any, arguments: tuple[np.ndarray, ...], results: tuple[np.ndarray, ...]) -> Callable[[], None]:
+    """Evaluate a CasADi Function from and into fixed arrays, without allocation."""
+    buffer, trigger = function.buffer()
+    for i, array in enumerate(arguments):
+        buffer.set_arg(i, memoryview(array))
+    for i, array in enumerate(results):
+        buffer.set_res(i, memoryview(array))
+
+    def evaluate(_keep_alive: tuple = (function, buffer, arguments, results)) -> None:
+        trigger()
+
+    return evaluate
+
+
+class Instance:
+    """Buffers of one block: inputs ``u``, parameters ``p``, state ``x``, reported signals ``y`` (flat, float64)."""
+
+    def __init__(self, block: Block) -> None:
+        self.block = block
+        self.u = block.start_vector(block.inputs)
+        self.p = block.start_vector(block.parameters)
+        self.x = np.zeros(total_size(block.held_state))
+        self.y = np.zeros(total_size(block.reported))
+        self.start_time = 0.0
+
+    def initialise(self, start_time: float) -> None:
+        """Check the parameters, compute the initial state and outputs. Raises ParameterError."""
+        problems = self.block.parameter_problems(self.p)
+        if not math.isfinite(start_time):
+            problems.append(f"start time {start_time} is not a time")
+        if problems:
+            raise ParameterError(f"{self.block.name}: " + "; ".join(problems))
+        self.start_time = start_time
+
+    def do_step(self, t: float, h: float) -> None:
+        """Step from t to t + h. Raises StepError, state unchanged, if that is impossible."""
+        raise StepError(f"{self.block.name} has no step")
+
+    def _check_step(self, t: float, h: float, period: float) -> None:
+        if not (math.isfinite(t) and math.isfinite(h) and h > 0):
+            raise StepError(
+                f"{self.block.name}: cannot step from t = {t} s by h = {h} s; h must be positive and finite"
+            )
+        if h / period > LONGEST_STEP:
+            raise StepError(f"{self.block.name}: a step of h = {h} s is more than {LONGEST_STEP} internal steps")
+
+    def get_state(self) -> dict[str, Any]:
+        """Everything that determines the future, as JSON-able values; floats survive bit for bit."""
+        return {
+            "u": self.u.tolist(),
+            "p": self.p.tolist(),
+            "x": self.x.tolist(),
+            "y": self.y.tolist(),
+            "start_time": self.start_time,
+        }
+
+    def set_state(self, state: dict[str, Any]) -> None:
+        """Return to a state from ``get_state`` of an instance of the same block."""
+        for name in ("u", "p", "x", "y"):
+            getattr(self, name)[:] = state[name]
+        self.start_time = state["start_time"]
+
+
+class SampledInstance(Instance):
+    """A sampled block with its sample clock."""
+
+    block: SampledBlock
+
+    def __init__(self, block: SampledBlock) -> None:
+        super().__init__(block)
+        self.next_sample = 0
+        self._w = np.full(block.normals, 0.5)
+        self._draws = np.zeros((0, block.normals))
+        self._draws_from: tuple[float, int] = (-1, 0)  # seed and first sample of the draws at hand
+        self._x_next = np.zeros_like(self.x)
+        self._first = buffered(block.first_function, (self.u, self.p, self._w), (self._x_next, self.y))
+        self._next = buffered(block.next_function, (self.x, self.u, self.p, self._w), (self._x_next, self.y))
+        names = [v.name for v in block.variables if v.group == "parameter"]
+        self._period_at = names.index("sample_period")
+        self._seed_at = names.index("seed") if block.normals else None
+
+    @property
+    def sample_period(self) -> float:
+        return self.p[self._period_at]
+
+    @property
+    def sample_time(self) -> float:
+        """Instant of the sample that the outputs belong to (s); the start time before the first."""
+        return self.start_time + max(self.next_sample - 1, 0) * self.sample_period
+
+    def initialise(self, start_time: float) -> None:
+        super().initialise(start_time)
+        self.next_sample = 0
+        self.refresh()
+
+    def refresh(self) -> None:
+        """Outputs as of the first sample if it were taken now; nothing once it was taken."""
+        if self.next_sample == 0:
+            self._draw(0)
+            self._first()
+
+    def sample(self) -> None:
+        """Take the next sample with the inputs in force."""
+        self._draw(self.next_sample)
+        if self.next_sample == 0:
+            self._first()
+        else:
+            self._next()
+        self.x[:] = self._x_next
+        self.next_sample += 1
+
+    def do_step(self, t: float, h: float) -> None:
+        self._check_step(t, h, self.sample_period)
+        end = math.ceil((t + h - self.start_time) / self.sample_period - CLOCK_TOLERANCE)
+        if end - self.next_sample > LONGEST_STEP:
+            raise StepError(f"{self.block.name}: t = {t} s lies more than {LONGEST_STEP} samples ahead")
+        for _ in range(self.next_sample, end):
+            self.sample()
+
+    def _draw(self, k: int) -> None:
+        if self._seed_at is None:
+            return
+        seed, first = self.p[self._seed_at], k - k % _DRAWS_AHEAD
+        if self._draws_from != (seed, first):
+            self._draws = uniforms(int(seed), first, _DRAWS_AHEAD, self.block.normals)
+            self._draws_from = (seed, first)
+        self._w[:] = self._draws[k - first]
+
+    def get_state(self) -> dict[str, Any]:
+        return super().get_state() | {"next_sample": self.next_sample}
+
+    def set_state(self, state: dict[str, Any]) -> None:
+        super().set_state(state)
+        self.next_sample = state["next_sample"]
+
+
+class ContinuousInstance(Instance):
+    """A continuous block with its solver."""
+
+    block: ContinuousBlock
+
+    def __init__(self, block: ContinuousBlock) -> None:
+        super().__init__(block)
+        self._t = np.zeros(1)
+        self._solver_t, self._solver_h = np.zeros(1), np.zeros(1)
+        self._x_next = np.zeros_like(self.x)
+        self._initial = buffered(block.initial_function, (self.p,), (self.x,))
+        arguments = (self.x, self.u, self.p, self._solver_t, self._solver_h)
+        self._advance = buffered(block.advance_function, arguments, (self._x_next,))
+        self._output = buffered(block.output_function, (self.x, self.u, self.p, self._t), (self.y,))
+        self._max_step_at = [v.name for v in block.variables if v.group == "parameter"].index("max_step")
+
+    @property
+    def time(self) -> float:
+        return float(self._t[0])
+
+    def initialise(self, start_time: float) -> None:
+        super().initialise(start_time)
+        self._t[0] = start_time
+        self._initial()
+        self.refresh()
+
+    def refresh(self) -> None:
+        """Outputs at the present time with the inputs in force."""
+        self._output()
+
+    def do_step(self, t: float, h: float) -> None:
+        max_step = self.p[self._max_step_at]
+        self._check_step(t, h, max_step)
+        substeps = solver_steps(h, max_step)
+        self._solver_h[0] = h / substeps
+        for i in range(substeps):
+            self._solver_t[0] = t + i * (h / substeps)
+            self._advance()
+            self.x[:] = self._x_next
+        self._t[0] = t + h
+        self.refresh()
+
+    def get_state(self) -> dict[str, Any]:
+        return super().get_state() | {"time": self.time}
+
+    def set_state(self, state: dict[str, Any]) -> None:
+        super().set_state(state)
+        self._t[0] = state["time"]
+
+
+def solver_steps(h: float, max_step: float) -> int:
+    """Number of equal solver steps, none longer than max_step (up to rounding), that make one step of h (s)."""
+    return max(1, math.ceil(h / max_step - 1e-9))
+
+
+def instantiate(block: Block) -> SampledInstance | ContinuousInstance:
+    """The instance class that fits the block."""
+    if isinstance(block, SampledBlock):
+        return SampledInstance(block)
+    assert isinstance(block, ContinuousBlock)
+    return ContinuousInstance(block)

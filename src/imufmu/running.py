@@ -1,0 +1,201 @@
+"""Run blocks in this process: a whole record in one call, or sample by sample."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from .block import Block, ContinuousBlock, SampledBlock
+from .instance import SampledInstance, solver_steps
+from .noise import uniforms
+from .signals import Signal, State, total_size
+
+_CHUNK = 1024  # steps evaluated by one call into CasADi
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """Signals over time. time: (n,), s. values: by signal name, (n,), (n, 3) or (n, 3, 3), in the signal's unit."""
+
+    time: np.ndarray
+    values: Mapping[str, np.ndarray]
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        return self.values[name]
+
+
+def run(
+    block: SampledBlock,
+    inputs: Mapping[str, Any],
+    parameters: Mapping[str, Any] | None = None,
+    *,
+    initial_state: Mapping[str, Any] | None = None,
+    start_time: float = 0.0,
+) -> Trajectory:
+    """Run a sampled block over a record, one row per sample.
+
+    inputs: array (n,) or (n, k) per input name; a missing name stays at its start value. NaN marks missing samples.
+    parameters: values by name. initial_state: replaces the block's own state of that name after the first sample.
+    Raises ParameterError for parameters, ValueError for inputs that do not fit.
+    """
+    u = _input_rows(block, inputs)
+    p = block.parameter_vector(parameters)
+    seed = int(dict(zip(_names(block), p, strict=True))["seed"]) if block.normals else 0
+    n = len(u)
+
+    def draws(first: int, count: int) -> np.ndarray:
+        return uniforms(seed, first, count, block.normals).T
+
+    x, y0 = (np.array(part).ravel() for part in block.first_function(u[0], p, draws(0, 1)))
+    if initial_state:
+        _replace(x, block.held_state, initial_state)
+        own = total_size(block.state)
+        y0 = np.array(block.output_function(x[:own], u[0], p, draws(0, 1))).ravel()
+    y = np.empty((n, len(y0)))
+    y[0] = y0
+    chunk, p_columns = _chunk(block.next_function), np.tile(p[:, None], _CHUNK)
+    for first in range(1, n, _CHUNK):
+        count = min(_CHUNK, n - first)
+        states, rows = chunk(x, _padded(u[first : first + count]), p_columns, draws(first, _CHUNK))
+        x = np.array(states[:, count - 1]).ravel()
+        y[first : first + count] = np.array(rows).T[:count]
+    period = p[_names(block).index("sample_period")]
+    return Trajectory(start_time + np.arange(n) * period, _by_name(block.reported, y))
+
+
+def simulate(
+    block: ContinuousBlock,
+    duration: float,
+    step: float,
+    inputs: Mapping[str, Any] | None = None,
+    parameters: Mapping[str, Any] | None = None,
+    *,
+    start_time: float = 0.0,
+) -> Trajectory:
+    """Run a continuous block over ``duration`` (s) with outputs every ``step`` (s), the first at the start.
+
+    inputs: array (n + 1,) or (n + 1, k) per input name, n = round(duration / step), row i held from i * step on; or one
+    value for the whole run. Raises ParameterError and ValueError as ``run``.
+    """
+    n = round(duration / step)
+    if not (step > 0 and n >= 1):
+        raise ValueError(f"duration {duration} s must be at least one step of {step} s")
+    u = _input_rows(block, inputs or {}, n + 1)
+    p = block.parameter_vector(parameters)
+    per_row = solver_steps(step, p[_names(block).index("max_step")])
+    time = start_time + np.arange(n + 1) * step
+    states = np.empty((n + 1, total_size(block.held_state)))
+    states[0] = np.array(block.initial_function(p)).ravel()
+    h = step / per_row
+    t = (time[:-1, None] + np.arange(per_row) * h).reshape(-1, 1)
+    u_held = np.repeat(u[:-1], per_row, axis=0)
+    chunk, p_columns, h_columns = _chunk(block.advance_function), np.tile(p[:, None], _CHUNK), np.full((1, _CHUNK), h)
+    x = states[0]
+    for first in range(0, len(t), _CHUNK):
+        some = slice(first, min(first + _CHUNK, len(t)))
+        reached = np.array(chunk(x, _padded(u_held[some]), p_columns, _padded(t[some]), h_columns)).T
+        x = reached[some.stop - first - 1]
+        done = np.arange(some.start + 1, some.stop + 1)  # solver steps behind us after each column
+        whole = done % per_row == 0
+        states[done[whole] // per_row] = reached[: len(done)][whole]
+    y = block.output_function.map(n + 1)(states.T, u.T, np.tile(p[:, None], n + 1), time[None, :])
+    return Trajectory(time, _by_name(block.reported, np.array(y).T))
+
+
+class Stream:
+    """A sampled block fed sample by sample.
+
+        tilt = Stream(lee2012.BLOCK, {"sample_period": 0.01})
+        out = tilt.update(gyro=(0, 0, 0.1), accel=(0, 0, 9.8))
+        out["roll"]
+
+    Raises ParameterError for parameters out of bounds.
+    """
+
+    def __init__(
+        self, block: SampledBlock, parameters: Mapping[str, Any] | None = None, start_time: float = 0.0
+    ) -> None:
+        self._instance = SampledInstance(block)
+        self._instance.p[:] = block.parameter_vector(parameters)
+        self._instance.initialise(start_time)
+        self._inputs, first = {}, 0
+        for signal in block.inputs:
+            self._inputs[signal.name] = slice(first, first + signal.size)
+            first += signal.size
+
+    def update(self, **inputs: Any) -> dict[str, Any]:
+        """Take the next sample. Returns float or array by signal name, and ``sample_time`` (s).
+
+        Inputs not given keep their value. Raises ValueError for an unknown input or a wrong size.
+        """
+        for name, value in inputs.items():
+            if name not in self._inputs:
+                raise ValueError(f"{self._instance.block.name} has no input {name!r}; it has {', '.join(self._inputs)}")
+            flat = np.asarray(value, dtype=float).reshape(-1)
+            part = self._inputs[name]
+            if flat.size != part.stop - part.start:
+                raise ValueError(f"{name}: {flat.size} values, expected {part.stop - part.start}")
+            self._instance.u[part] = flat
+        self._instance.sample()
+        values = _by_name(self._instance.block.reported, self._instance.y[None, :].copy())
+        result: dict[str, Any] = {name: value[0] for name, value in values.items()}
+        return result | {"sample_time": self._instance.sample_time}
+
+
+@lru_cache(maxsize=64)
+def _chunk(function: Any) -> Any:
+    """The function applied _CHUNK times, its first argument accumulated."""
+    return function.mapaccum(_CHUNK)
+
+
+def _padded(rows: np.ndarray) -> np.ndarray:
+    """Rows as _CHUNK columns, the last one repeated."""
+    return np.pad(rows, ((0, _CHUNK - len(rows)), (0, 0)), mode="edge").T
+
+
+def _names(block: Block) -> list[str]:
+    return [v.name for v in block.variables if v.group == "parameter"]
+
+
+def _input_rows(block: Block, inputs: Mapping[str, Any], length: int | None = None) -> np.ndarray:
+    """Inputs as rows (n, size of all inputs); n is ``length``, or that of the longest input."""
+    unknown = set(inputs) - {signal.name for signal in block.inputs}
+    if unknown:
+        known = ", ".join(signal.name for signal in block.inputs)
+        raise ValueError(f"{block.name} has no input {', '.join(sorted(unknown))}; it has {known}")
+    arrays = {name: np.asarray(value, dtype=float) for name, value in inputs.items()}
+    n = length if length is not None else max((len(a) for a in arrays.values() if a.ndim), default=0)
+    if n == 0:
+        raise ValueError(f"{block.name}: no samples given")
+    columns = []
+    for signal in block.inputs:
+        value = arrays.get(signal.name, np.array(signal.start_values()))
+        if value.size == signal.size:
+            value = np.broadcast_to(value.reshape(-1), (n, signal.size))
+        if value.size != n * signal.size or len(value) != n:
+            raise ValueError(f"{signal.name}: shape {value.shape}, expected ({n}, {signal.size})")
+        columns.append(value.reshape(n, signal.size))
+    return np.hstack(columns) if columns else np.zeros((n, 0))
+
+
+def _by_name(signals: Sequence[Signal], rows: np.ndarray) -> dict[str, np.ndarray]:
+    result, first = {}, 0
+    for signal in signals:
+        result[signal.name] = rows[:, first : first + signal.size].reshape(len(rows), *signal.shape)
+        first += signal.size
+    return result
+
+
+def _replace(x: np.ndarray, items: Sequence[State], values: Mapping[str, Any]) -> None:
+    unknown = set(values) - {item.name for item in items}
+    if unknown:
+        raise ValueError(f"no state {', '.join(sorted(unknown))}; there is {', '.join(item.name for item in items)}")
+    first = 0
+    for item in items:
+        if item.name in values:
+            x[first : first + item.size] = np.broadcast_to(np.asarray(values[item.name], float), item.shape).ravel()
+        first += item.size
