@@ -41,14 +41,17 @@ def buffered(function: Any, arguments: tuple[np.ndarray, ...], results: tuple[np
 
 
 class Instance:
-    """Buffers of one block: inputs ``u``, parameters ``p``, state ``x``, reported signals ``y`` (flat, float64)."""
+    """Buffers of one block (flat, float64): inputs ``u``, parameters ``p``, state ``x``, reported signals ``y``.
+
+    u, p and y are parts of ``values``, which holds every variable in the order of ``block.variables``.
+    """
 
     def __init__(self, block: Block) -> None:
         self.block = block
-        self.u = block.start_vector(block.inputs)
-        self.p = block.start_vector(block.parameters)
+        inputs, parameters = block.start_vector(block.inputs), block.start_vector(block.parameters)
+        self.values = np.concatenate([inputs, parameters, np.zeros(total_size(block.reported))])
+        self.u, self.p, self.y = np.split(self.values, [len(inputs), len(inputs) + len(parameters)])
         self.x = np.zeros(total_size(block.held_state))
-        self.y = np.zeros(total_size(block.reported))
         self.start_time = 0.0
 
     def initialise(self, start_time: float) -> None:
@@ -75,17 +78,15 @@ class Instance:
     def get_state(self) -> dict[str, Any]:
         """Everything that determines the future, as JSON-able values; floats survive bit for bit."""
         return {
-            "u": self.u.tolist(),
-            "p": self.p.tolist(),
+            "values": self.values.tolist(),
             "x": self.x.tolist(),
-            "y": self.y.tolist(),
             "start_time": self.start_time,
         }
 
     def set_state(self, state: dict[str, Any]) -> None:
         """Return to a state from ``get_state`` of an instance of the same block."""
-        for name in ("u", "p", "x", "y"):
-            getattr(self, name)[:] = state[name]
+        self.values[:] = state["values"]
+        self.x[:] = state["x"]
         self.start_time = state["start_time"]
 
 
@@ -109,7 +110,7 @@ class SampledInstance(Instance):
 
     @property
     def sample_period(self) -> float:
-        return self.p[self._period_at]
+        return float(self.p[self._period_at])
 
     @property
     def sample_time(self) -> float:
@@ -139,10 +140,10 @@ class SampledInstance(Instance):
 
     def do_step(self, t: float, h: float) -> None:
         self._check_step(t, h, self.sample_period)
-        end = math.ceil((t + h - self.start_time) / self.sample_period - CLOCK_TOLERANCE)
-        if end - self.next_sample > LONGEST_STEP:
-            raise StepError(f"{self.block.name}: t = {t} s lies more than {LONGEST_STEP} samples ahead")
-        for _ in range(self.next_sample, end):
+        end = (t + h - self.start_time) / self.sample_period - CLOCK_TOLERANCE
+        if not abs(end - self.next_sample) <= LONGEST_STEP:
+            raise StepError(f"{self.block.name}: t = {t} s lies more than {LONGEST_STEP} samples away")
+        for _ in range(self.next_sample, math.ceil(end)):
             self.sample()
 
     def _draw(self, k: int) -> None:

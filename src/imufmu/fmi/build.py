@@ -1,0 +1,95 @@
+"""Build FMUs: a script of fmu_src, the runtime, the documentation and an icon in one archive.
+
+The same source gives the same bytes: no time stamps, no random GUID, files in sorted order.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import sys
+import tempfile
+import zipfile
+from pathlib import Path
+
+from platformdirs import user_cache_path
+from pythonfmu.builder import FmuBuilder
+
+from .. import __version__
+from ..files import atomic_write
+from ..locations import fmu_src_folder
+from ..registry import BLOCKS
+from . import runtime
+from .documentation import icon, write_documentation
+
+_FIXED_TIME = (1980, 1, 1, 0, 0, 0)  # the earliest a zip can say
+
+
+class BuildError(ValueError):
+    """An FMU cannot be built; the message says why."""
+
+
+def build_fmu(name: str, folder: Path) -> Path:
+    """Write the Python FMU of the registered block ``name`` to folder/name.fmu and return that path.
+
+    Raises BuildError for an unknown name or a folder that cannot be written.
+    """
+    if name not in BLOCKS:
+        raise BuildError(f"no block is called {name!r}; there is {', '.join(BLOCKS)}")
+    target = folder / f"{name}.fmu"
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryDirectory(prefix="imufmu_build_") as scratch:
+            built = _pythonfmu_build(name, Path(scratch))
+            with atomic_write(target) as temporary:
+                _repack(built, name, temporary)
+    except OSError as error:
+        raise BuildError(f"cannot write {target}: {error.strerror or error}") from error
+    return target
+
+
+def cached_fmu(name: str) -> Path:
+    """Path of the FMU of a registered block in the user's cache, built when its source has changed."""
+    sources = [*Path(__file__).parent.rglob("*.[pj]*"), fmu_src_folder() / f"{name}_fmu.py"]
+    digest = hashlib.sha256(runtime.fingerprint(runtime.PACKAGE).encode())
+    for source in sorted(path for path in sources if path.is_file()):
+        digest.update(source.read_bytes())
+    folder = user_cache_path("imufmu") / f"{__version__}-{digest.hexdigest()[:16]}"
+    path = folder / f"{name}.fmu"
+    return path if path.is_file() else build_fmu(name, folder)
+
+
+def _pythonfmu_build(name: str, scratch: Path) -> Path:
+    """Let PythonFMU put script, runtime, wrapper binaries and documentation together."""
+    staged = scratch / "staged"
+    staged.mkdir()
+    runtime.copy_to(staged)
+    documentation = scratch / "documentation"
+    write_documentation(BLOCKS[name], documentation)
+    script = fmu_src_folder() / f"{name}_fmu.py"
+    if not script.is_file():
+        raise BuildError(f"{name}: its script {script.name} is not in {script.parent}")
+    try:
+        return Path(
+            FmuBuilder.build_FMU(
+                script,
+                dest=scratch / f"{name}.fmu",
+                project_files=[staged / "imufmu"],
+                documentation_folder=documentation,
+                needsExecutionTool=False,
+            )
+        )
+    finally:
+        # The builder imports the script by its name and leaves it and its folder behind.
+        sys.modules.pop(script.stem, None)
+        sys.path[:] = [entry for entry in sys.path if Path(entry) != script.parent]
+
+
+def _repack(built: Path, name: str, target: Path) -> None:
+    """Same members in sorted order with a fixed time, plus the icon."""
+    with zipfile.ZipFile(built) as source, zipfile.ZipFile(target, "w", zipfile.ZIP_DEFLATED) as archive:
+        members = {member: source.read(member) for member in source.namelist()} | {"model.png": icon(name)}
+        for member, content in sorted(members.items()):
+            entry = zipfile.ZipInfo(member, _FIXED_TIME)
+            entry.compress_type = zipfile.ZIP_DEFLATED
+            entry.external_attr = 0o644 << 16
+            archive.writestr(entry, content)

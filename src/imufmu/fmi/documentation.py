@@ -1,0 +1,77 @@
+"""What a user reads about a block: tables of its signals and parameters, the FMU's documentation page, its icon."""
+
+from __future__ import annotations
+
+import inspect
+import io
+from pathlib import Path
+
+from jinja2 import Environment, PackageLoader, StrictUndefined
+from matplotlib.figure import Figure
+from matplotlib.patches import Circle
+
+from .. import __version__
+from ..block import Block, SampledBlock
+from ..signals import Parameter, Signal
+
+
+def signal_rows(signals: tuple[Signal, ...]) -> list[dict[str, str]]:
+    """One row per signal or parameter: name with its index range, unit, start, bounds, description."""
+    rows = []
+    for signal in signals:
+        index = f"[{','.join(f'1..{n}' for n in signal.shape)}]" if signal.shape else ""
+        starts = dict.fromkeys(f"{value:.6g}" for value in signal.start_values())  # in order, without repetition
+        start = next(iter(starts)) if len(starts) == 1 else ", ".join(f"{v:.6g}" for v in signal.start_values())
+        rows.append(
+            {
+                "name": signal.name + index,
+                "unit": signal.unit,
+                "start": start,
+                "range": f"{signal.minimum:.6g} to {signal.maximum:.6g}",
+                "description": signal.description,
+                "tunable": "yes" if isinstance(signal, Parameter) and signal.tunable else "no",
+            }
+        )
+    return rows
+
+
+def equations(block: Block) -> str:
+    """The module docstring of the block: its equations, symbols and source."""
+    module = inspect.getmodule(block.output)
+    return inspect.cleandoc(module.__doc__ or "") if module else ""
+
+
+def write_documentation(block: Block, folder: Path) -> None:
+    """Write index.html into a new folder."""
+    environment = Environment(loader=PackageLoader("imufmu.fmi"), autoescape=True, undefined=StrictUndefined)
+    page = environment.get_template("documentation.html").render(
+        block=block,
+        version=__version__,
+        sampled=isinstance(block, SampledBlock),
+        equations=equations(block),
+        tables={
+            "Inputs": signal_rows(block.inputs),
+            "Parameters": signal_rows(block.parameters),
+            "Outputs": signal_rows(block.outputs),
+            "Local variables": signal_rows(block.locals),
+        },
+    )
+    folder.mkdir()
+    (folder / "index.html").write_text(page, encoding="utf-8")
+
+
+def icon(name: str) -> bytes:
+    """PNG of an artificial horizon above the block's name."""
+    figure = Figure(figsize=(1.28, 1.28), dpi=100)
+    axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
+    axes.set_axis_off()
+    axes.set(xlim=(-1, 1), ylim=(-1.25, 0.75), aspect="equal")
+    rim = Circle((0, 0.05), 0.62, facecolor="#9cc4e4", edgecolor="#26323f", linewidth=2)
+    axes.add_patch(rim)
+    ground = axes.fill([-1, 1, 1, -1], [-0.12, 0.22, -1, -1], color="#9b7653")[0]
+    ground.set_clip_path(rim)
+    axes.plot([-0.35, -0.12, 0, 0.12, 0.35], [0.05, 0.05, -0.05, 0.05, 0.05], color="#f2b705", linewidth=2.5)
+    axes.text(0, -0.98, name, ha="center", va="center", fontsize=max(5.0, 10.5 - 0.28 * len(name)), color="#26323f")
+    image = io.BytesIO()
+    figure.savefig(image, format="png", metadata={"Software": None})
+    return image.getvalue()

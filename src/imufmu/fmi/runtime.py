@@ -1,0 +1,54 @@
+"""The part of imufmu that travels inside a Python FMU, and how two copies of it are compared.
+
+All Python FMUs in a process share one imported imufmu: the first one loaded. An FMU therefore carries every block, and
+refuses to start on a package in memory whose source differs from its own.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import shutil
+from pathlib import Path
+
+PACKAGE = Path(__file__).parents[1]
+
+_MODULES = ("__init__", "signals", "vocabulary", "rotations", "noise", "block", "instance", "fmi/slave", "fmi/runtime")
+_FOLDERS = ("estimators", "plants", "sensors")
+
+
+def files(package: Path) -> list[Path]:
+    """The runtime's source files below a copy of the package, as relative paths."""
+    fixed = [Path(f"{module}.py") for module in (*_MODULES, "fmi/__init__")]
+    blocks = [path.relative_to(package) for folder in _FOLDERS for path in (package / folder).glob("*.py")]
+    return sorted([*fixed, *blocks])
+
+
+def copy_to(folder: Path) -> None:
+    """Copy the runtime of the package in memory to folder/imufmu."""
+    for path in files(PACKAGE):
+        target = folder / "imufmu" / path
+        target.parent.mkdir(parents=True, exist_ok=True)
+        shutil.copyfile(PACKAGE / path, target)
+
+
+def fingerprint(package: Path) -> str:
+    """Hash of the runtime's source in a copy of the package, the same for any line ends."""
+    digest = hashlib.sha256()
+    for path in files(package):
+        digest.update(f"{path.as_posix()}\n".encode())
+        digest.update((package / path).read_text(encoding="utf-8").encode())
+    return digest.hexdigest()
+
+
+def refusal(resources: Path) -> str:
+    """Why the package in memory cannot serve the FMU with these resources; empty if it can."""
+    own = resources / "imufmu"
+    if not own.is_dir():
+        return f"{resources} holds no copy of imufmu: the FMU is incomplete, build it again"
+    if own.resolve() == PACKAGE.resolve() or fingerprint(own) == fingerprint(PACKAGE):
+        return ""
+    return (
+        f"this FMU was built from another version of imufmu than the one already in memory ({PACKAGE}). "
+        "Python FMUs in one process share the first imufmu that was loaded: build the FMUs from the same version, "
+        "or run them in separate processes"
+    )
