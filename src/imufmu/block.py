@@ -39,7 +39,7 @@ from . import vocabulary
 from .noise import standard_normal
 from .signals import DeclarationError, Parameter, Shape, Signal, State, total_size
 
-LARGEST_INPUT = 1e100  # larger magnitudes count as not finite: their squares would overflow
+LARGEST_INPUT = 1e30  # larger magnitudes count as not finite: in a covariance their powers would overflow
 
 Expressions = Mapping[str, Any]
 
@@ -133,7 +133,11 @@ class Block:
             if name not in places:
                 problems.append(f"{name}: unknown; {self.name} has {', '.join(q.name for q in self.parameters)}")
                 continue
-            flat = np.asarray(value, dtype=float).reshape(-1)
+            try:
+                flat = np.asarray(value, dtype=float).reshape(-1)
+            except (TypeError, ValueError):
+                problems.append(f"{name}: {value!r} is not a number")
+                continue
             if flat.size not in (1, places[name].stop - places[name].start):
                 problems.append(f"{name}: {flat.size} values for {places[name].stop - places[name].start} elements")
                 continue
@@ -184,8 +188,8 @@ class Block:
         columns = []
         for item in items:
             value = ca.SX(values[item.name])
-            if value.numel() != item.size:
-                raise DeclarationError(f"{self.name}.{what}: {item.name} has {value.numel()} elements, not {item.size}")
+            if value.numel() != item.size or (len(item.shape) == 2 and value.shape != item.shape):
+                raise DeclarationError(f"{self.name}.{what}: {item.name} has shape {value.shape}, not {item.shape}")
             columns.append(ca.vec(value.T) if len(item.shape) == 2 else ca.vec(value))
         return ca.densify(ca.vertcat(*columns))
 

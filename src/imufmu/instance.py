@@ -30,9 +30,9 @@ def buffered(function: Any, arguments: tuple[np.ndarray, ...], results: tuple[np
     """Evaluate a CasADi Function from and into fixed arrays, without allocation."""
     buffer, trigger = function.buffer()
     for i, array in enumerate(arguments):
-        buffer.set_arg(i, memoryview(array))
+        buffer.set_arg(i, array.data)
     for i, array in enumerate(results):
-        buffer.set_res(i, memoryview(array))
+        buffer.set_res(i, array.data)
 
     def evaluate(_keep_alive: tuple = (function, buffer, arguments, results)) -> None:
         trigger()
@@ -198,12 +198,17 @@ class ContinuousInstance(Instance):
         self._check_step(t, h, max_step)
         substeps = solver_steps(h, max_step)
         self._solver_h[0] = h / substeps
+        before, time_before = self.x.copy(), self.time
         for i in range(substeps):
             self._solver_t[0] = t + i * (h / substeps)
             self._advance()
             self.x[:] = self._x_next
         self._t[0] = t + h
         self.refresh()
+        if not (np.isfinite(self.y).all() and np.isfinite(self.x).all()):
+            self.x[:], self._t[0] = before, time_before
+            self.refresh()
+            raise StepError(diverged(self.block, t + h, max_step))
 
     def get_state(self) -> dict[str, Any]:
         return super().get_state() | {"time": self.time}
@@ -216,6 +221,11 @@ class ContinuousInstance(Instance):
 def solver_steps(h: float, max_step: float) -> int:
     """Number of equal solver steps, none longer than max_step (up to rounding), that make one step of h (s)."""
     return max(1, math.ceil(h / max_step - 1e-9))
+
+
+def diverged(block: Block, t: float, max_step: float) -> str:
+    """Message for a solution that is not finite any more at t (s)."""
+    return f"{block.name}: not finite at t = {t} s; the solver needs a max_step below {max_step:g} s, or calmer inputs"
 
 
 def instantiate(block: Block) -> SampledInstance | ContinuousInstance:

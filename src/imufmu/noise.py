@@ -31,7 +31,8 @@ def uniforms(seed: int, first: int, count: int, width: int) -> np.ndarray:
     with np.errstate(over="ignore"):  # arithmetic modulo 2^64 is meant
         stream = _mix(np.array([seed], dtype=np.uint64) + _STRIDE)
         z = _mix(stream + (index + np.uint64(1)) * _STRIDE)
-    return ((z >> np.uint64(11)).astype(float) + 0.5).reshape(count, width) * 2.0**-53
+    # 52 bits and a half: exact in a double, so neither 0 nor 1 is ever reached.
+    return ((z >> np.uint64(12)).astype(float) + 0.5).reshape(count, width) * 2.0**-52
 
 
 # Rational approximations of the normal quantile, M. J. Wichura, Algorithm AS 241 (PPND16), Applied Statistics 37(3),

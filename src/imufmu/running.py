@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from .block import Block, ContinuousBlock, SampledBlock
-from .instance import SampledInstance, solver_steps
+from .instance import SampledInstance, StepError, diverged, solver_steps
 from .noise import uniforms
 from .signals import Signal, State, total_size
 
@@ -79,11 +79,11 @@ def simulate(
     """Run a continuous block over ``duration`` (s) with outputs every ``step`` (s), the first at the start.
 
     inputs: array (n + 1,) or (n + 1, k) per input name, n = round(duration / step), row i held from i * step on; or one
-    value for the whole run. Raises ParameterError and ValueError as ``run``.
+    value for the whole run. Raises ParameterError and ValueError as ``run``, StepError where the solution diverges.
     """
+    if not (0 < step < np.inf and 0.5 * step < duration < np.inf):
+        raise ValueError(f"duration {duration} s must be finite and at least one step of {step} s")
     n = round(duration / step)
-    if not (step > 0 and n >= 1):
-        raise ValueError(f"duration {duration} s must be at least one step of {step} s")
     u = _input_rows(block, inputs or {}, n + 1)
     p = block.parameter_vector(parameters)
     per_row = solver_steps(step, p[_names(block).index("max_step")])
@@ -102,8 +102,11 @@ def simulate(
         done = np.arange(some.start + 1, some.stop + 1)  # solver steps behind us after each column
         whole = done % per_row == 0
         states[done[whole] // per_row] = reached[: len(done)][whole]
-    y = block.output_function.map(n + 1)(states.T, u.T, np.tile(p[:, None], n + 1), time[None, :])
-    return Trajectory(time, _by_name(block.reported, np.array(y).T))
+    y = np.array(block.output_function.map(n + 1)(states.T, u.T, np.tile(p[:, None], n + 1), time[None, :])).T
+    bad = np.flatnonzero(~np.isfinite(np.hstack([y, states])).all(axis=1))
+    if bad.size:
+        raise StepError(diverged(block, time[bad[0]], p[_names(block).index("max_step")]))
+    return Trajectory(time, _by_name(block.reported, y))
 
 
 class Stream:
@@ -135,7 +138,7 @@ class Stream:
         for name, value in inputs.items():
             if name not in self._inputs:
                 raise ValueError(f"{self._instance.block.name} has no input {name!r}; it has {', '.join(self._inputs)}")
-            flat = np.asarray(value, dtype=float).reshape(-1)
+            flat = _numbers(name, value).reshape(-1)
             part = self._inputs[name]
             if flat.size != part.stop - part.start:
                 raise ValueError(f"{name}: {flat.size} values, expected {part.stop - part.start}")
@@ -167,19 +170,28 @@ def _input_rows(block: Block, inputs: Mapping[str, Any], length: int | None = No
     if unknown:
         known = ", ".join(signal.name for signal in block.inputs)
         raise ValueError(f"{block.name} has no input {', '.join(sorted(unknown))}; it has {known}")
-    arrays = {name: np.asarray(value, dtype=float) for name, value in inputs.items()}
-    n = length if length is not None else max((len(a) for a in arrays.values() if a.ndim), default=0)
+    arrays = {name: _numbers(name, value) for name, value in inputs.items()}
+    shapes = {signal.name: signal.shape for signal in block.inputs}
+    lengths = [len(a) for name, a in arrays.items() if a.ndim and a.shape != shapes[name]]  # the others are constant
+    n = length if length is not None else max(lengths, default=0)
     if n == 0:
         raise ValueError(f"{block.name}: no samples given")
     columns = []
     for signal in block.inputs:
-        value = arrays.get(signal.name, np.array(signal.start_values()))
-        if value.size == signal.size:
+        value = arrays.get(signal.name, np.array(signal.start_values()).reshape(signal.shape))
+        if value.shape == signal.shape:
             value = np.broadcast_to(value.reshape(-1), (n, signal.size))
         if value.size != n * signal.size or len(value) != n:
-            raise ValueError(f"{signal.name}: shape {value.shape}, expected ({n}, {signal.size})")
+            raise ValueError(f"{signal.name}: shape {value.shape}, expected {(n, *signal.shape)}")
         columns.append(value.reshape(n, signal.size))
     return np.hstack(columns) if columns else np.zeros((n, 0))
+
+
+def _numbers(name: str, value: Any) -> np.ndarray:
+    try:
+        return np.asarray(value, dtype=float)
+    except (TypeError, ValueError):
+        raise ValueError(f"{name}: not an array of numbers, or its rows differ in length") from None
 
 
 def _by_name(signals: Sequence[Signal], rows: np.ndarray) -> dict[str, np.ndarray]:
@@ -197,5 +209,8 @@ def _replace(x: np.ndarray, items: Sequence[State], values: Mapping[str, Any]) -
     first = 0
     for item in items:
         if item.name in values:
-            x[first : first + item.size] = np.broadcast_to(np.asarray(values[item.name], float), item.shape).ravel()
+            value = _numbers(item.name, values[item.name])
+            if value.size not in (1, item.size):
+                raise ValueError(f"state {item.name}: {value.size} values, expected {item.size}")
+            x[first : first + item.size] = value.ravel()
         first += item.size

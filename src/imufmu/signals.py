@@ -85,6 +85,8 @@ class Signal:
             raise DeclarationError(f"{self.name!r} is not a variable name")
         if not self.description:
             raise DeclarationError(f"{self.name}: description missing")
+        if len(self.shape) > 2 or min(self.shape, default=1) < 1:
+            raise DeclarationError(f"{self.name}: shape {self.shape} is not that of a scalar, vector or matrix")
         for value in self.start_values():
             if not self.minimum <= value <= self.maximum:
                 raise DeclarationError(f"{self.name}: start {value} outside [{self.minimum}, {self.maximum}]")

@@ -9,7 +9,7 @@ from __future__ import annotations
 from enum import IntFlag
 from math import pi
 
-from .signals import Parameter, Signal, integer, real
+from .signals import Parameter, Signal, Values, integer, real
 
 GRAVITY = 9.80665  # m/s2, standard gravity, the plants' default
 
@@ -20,7 +20,7 @@ _FORCE_LIMIT = 1e5  # m/s2
 _FIELD_LIMIT = 1e6  # uT
 
 
-def _xyz(name: str, unit: str, limit: float, nominal: float, description: str, start=0.0) -> Signal:
+def _xyz(name: str, unit: str, limit: float, nominal: float, description: str, start: Values = 0.0) -> Signal:
     return Signal(name, unit, description, -limit, limit, _XYZ, start, nominal)
 
 

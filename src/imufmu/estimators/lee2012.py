@@ -31,15 +31,17 @@ from ..rotations import roll_pitch, root, skew, unit, vertical_from_roll_pitch
 from ..signals import Signal, State, integer, real, switch
 
 ENDLESS = 1e9  # more quiet samples than any window asks for
+NO_DIRECTION = 1e-6  # of g: a first accelerometer sample shorter than this points nowhere
+LARGEST_TRACE = 1e6  # of P: a longer prediction without update would overflow; nothing is known by then
 
 
 def initial(u: SimpleNamespace, p: SimpleNamespace) -> Expressions:
     """Attitude from the first accelerometer sample, or from the given angles."""
-    started = ca.logic_or(1 - u.accel_missing, p.use_initial_angles)
+    started = ca.logic_or(is_usable(u, p), p.use_initial_angles)
     Z = start_vertical(u, p)
     return dict(
         Z=Z,
-        a=ca.if_else(u.accel_missing, 0, u.accel - p.g * Z),
+        a=ca.if_else(ca.logic_and(started, 1 - u.accel_missing), u.accel - p.g * Z, 0),
         P=p.P0 * ca.SX.eye(3),
         innovation=ca.SX.zeros(3),
         quiet_samples=ca.if_else(is_quiet(u, p), ENDLESS * (1 - p.early_is_moving) + 1, 0),
@@ -51,8 +53,13 @@ def initial(u: SimpleNamespace, p: SimpleNamespace) -> Expressions:
 def start_vertical(u: SimpleNamespace, p: SimpleNamespace) -> Any:
     """Up vector in S before any update; (0, 0, 1) as long as nothing is known."""
     given = vertical_from_roll_pitch(p.initial_roll, p.initial_pitch)
-    measured = ca.if_else(u.accel_missing, ca.DM([0, 0, 1]), unit(u.accel))
+    measured = ca.if_else(is_usable(u, p), unit(u.accel), ca.DM([0, 0, 1]))
     return ca.if_else(p.use_initial_angles, given, measured)
+
+
+def is_usable(u: SimpleNamespace, p: SimpleNamespace) -> Any:
+    """1 where the accelerometer sample has a direction to start from."""
+    return ca.logic_and(ca.norm_2(u.accel) > NO_DIRECTION * p.g, 1 - u.accel_missing)
 
 
 def is_quiet(u: SimpleNamespace, p: SimpleNamespace) -> Any:
@@ -71,7 +78,8 @@ def predict(x: SimpleNamespace, gyro: Any, p: SimpleNamespace) -> tuple[Any, Any
     dt = p.sample_period
     Phi = ca.SX.eye(3) - dt * skew(gyro)  # (12)
     Q = -(dt**2) * p.sigma_g2 * skew(x.Z) @ skew(x.Z)  # (15)
-    return Phi @ x.Z, Phi @ x.P @ Phi.T + Q  # (24), (25)
+    P = Phi @ x.P @ Phi.T + Q  # (25)
+    return Phi @ x.Z, P / ca.fmax(1, ca.trace(P) / LARGEST_TRACE)  # (24)
 
 
 def update(Z: Any, P: Any, z: Any, M: Any, g: Any, accepted: Any) -> tuple[Any, Any, Any]:
@@ -80,9 +88,10 @@ def update(Z: Any, P: Any, z: Any, M: Any, g: Any, accepted: Any) -> tuple[Any, 
     M: scalar, the measurement variance of each axis.
     """
     innovation = z - g * Z
-    K = g * P @ ca.inv_minor(g**2 * P + M * ca.SX.eye(3))  # (26), H = g I
-    K = ca.if_else(accepted, K, 0)
-    return unit(Z + K @ innovation), (ca.SX.eye(3) - g * K) @ P, innovation  # (27), (28)
+    inverse = ca.inv_minor(g**2 * P + M * ca.SX.eye(3))
+    K = ca.if_else(accepted, g * P @ inverse, 0)  # (26), H = g I
+    I_KH = ca.if_else(accepted, M * inverse, ca.SX.eye(3))  # I - g K, without its cancellation where g^2 P >> M
+    return unit(Z + K @ innovation), I_KH @ P, innovation  # (27), (28)
 
 
 def step(x: SimpleNamespace, u: SimpleNamespace, p: SimpleNamespace) -> Expressions:
@@ -138,8 +147,8 @@ BLOCK = SampledBlock(
     doc="""Estimates the up vector in the sensor frame, hence roll and pitch, and the external acceleration. Mode 1
 models the external acceleration as low-pass filtered noise: good for short accelerations. Mode 2 takes every
 accelerometer sample for gravity: for quasi-static use only. Mode 3 uses the accelerometer only after its norm stayed
-near g for n samples. The filter has no gyroscope bias state: remove a constant bias first. Sustained acceleration (cornering,
-braking) tilts the estimate in every mode. Heading is not estimated.""",
+near g for n samples. The filter has no gyroscope bias state: remove a constant bias first. Sustained acceleration
+(cornering, braking) tilts the estimate in every mode. Heading is not estimated.""",
     reference="J. K. Lee, E. J. Park, S. N. Robinovitch, IEEE Transactions on Instrumentation and Measurement 61(8), "
     "2012, doi:10.1109/TIM.2012.2187245",
     inputs=(v.GYRO, v.ACCEL),
@@ -158,7 +167,7 @@ braking) tilts the estimate in every mode. Heading is not estimated.""",
             "sigma_a2",
             "m2/s4",
             1e-4,
-            (1e-12, 1e6),
+            (1e-9, 1e6),
             "Accelerometer variance per sample; larger trusts it less",
             tunable=True,
         ),
@@ -177,7 +186,7 @@ braking) tilts the estimate in every mode. Heading is not estimated.""",
         integer(
             "gyro_index", 0, (0, 2), "Gyroscope sample of the prediction: 0 previous (as printed), 1 current, 2 mean"
         ),
-        real("P0", "1", 1.0, (0, 1e6), "Variance of the vertical at the start, each axis"),
+        real("P0", "1", 1.0, (0, 1e5), "Variance of the vertical at the start, each axis"),
         switch(
             "use_initial_angles", "0 start from the first accelerometer sample, 1 from initial_roll and initial_pitch"
         ),

@@ -106,9 +106,7 @@ class BlockSlave(Fmi2Slave):
         if missing and not self._missing:
             names = [v.name for v in self.block.variables[: self._inputs] if not math.isfinite(self._values[v.index])]
             if names:
-                self.log(
-                    f"{self.block.name}: not finite, treated as missing: {', '.join(names)}", Fmi2Status.warning
-                )
+                self.log(f"{self.block.name}: not finite, treated as missing: {', '.join(names)}", Fmi2Status.warning)
         self._missing = missing
 
     def _refresh(self) -> None:

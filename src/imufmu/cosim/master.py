@@ -1,0 +1,237 @@
+"""The co-simulation master: a fixed communication step, counted in integer ticks, along the signal flow.
+
+Two kinds of FMU, told apart by their outputs. A **sampled** one (all outputs discrete: IMU, estimator, controller)
+answers to the inputs of time t: doStep(t, h) processes the samples in [t, t + h). A **continuous** one (a plant)
+advances: its outputs after doStep(t, h) are those of t + h. So a tick from t to t + h is
+
+    1  sampled FMUs, along the signal flow: set inputs, doStep(t, h), get outputs
+    2  record the row of time t: truth and samples belong together, no delay is added
+    3  continuous FMUs, along the signal flow: set inputs, doStep(t, h), get outputs, now of t + h
+
+Jacobi takes all inputs before the tick instead, so every connection from a sampled FMU adds a delay of one step.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+import sys
+import tempfile
+import time as clock
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..archives import open_fmu
+from .exchange import Exchange
+from .interrupt import interrupt_between_calls
+from .order import signal_flow
+from .results import Result
+from .settings import Setting
+from .slave import SimulationError, Slave
+from .system import Part, System, locate
+
+MOST_TICKS = 10**8  # more is taken for a wrong unit
+_BETWEEN_PROGRESS = 0.1  # s
+_PLAIN_PATH = re.compile(r"[A-Za-z0-9_.\-~ /\\:]*")  # FMUs get it as a URI, and some decode no more than spaces
+
+Progress = Callable[[int, int], None]
+
+
+@dataclass(frozen=True)
+class Ticks:
+    """Communication points start + k h, k = 0 ... count (s)."""
+
+    start: float
+    h: float
+    count: int
+
+    def time(self, k: int) -> float:
+        return self.start + k * self.h
+
+
+def simulate(
+    system: System | str | Path,
+    *,
+    start_time: float | None = None,
+    stop_time: float | None = None,
+    step: float | None = None,
+    parameters: Mapping[str, Any] | None = None,
+    record: Sequence[str] | None = None,
+    jacobi: bool = False,
+    progress: Progress | None = None,
+) -> Result:
+    """Run a system: a System, a file (.ssd, .ssp), or the name of a system of imufmu.
+
+    Times in s; what is not given comes from the description, a step also from the FMUs (the smallest they prefer).
+    parameters: start values by ``component.variable``, a vector by its name. record: names of variables or vectors
+    (default: all outputs). progress(done, total), in ticks, is called now and then.
+
+    Raises WiringError and what System.read raises for a system that does not fit, ValueError for impossible times,
+    SimulationError for a run that fails. Whatever happens, no instance and no temporary file stays behind.
+    """
+    if not isinstance(system, System):
+        system = System.read(locate(system))
+    settings = system.settings_with(parameters or {})
+    ticks = _ticks(system, start_time, stop_time, step)
+    exchange = Exchange(system, record)
+    schedule = _Schedule(system, jacobi)
+    notes = [*system.notes, *_period_notes(system, settings, ticks.h), *schedule.notes]
+    with ExitStack() as stack:
+        check = stack.enter_context(interrupt_between_calls())
+        slaves = _start(system.parts, stack)
+        for name, slave in slaves.items():
+            slave.connect(exchange.outlets(name), exchange.inlets(name))
+        notes += _initialise(slaves, schedule, exchange, settings, ticks.start)
+        exchange.new_tables(ticks.count + 1)
+        _run(slaves, schedule, exchange, ticks, check, progress)
+        notes += [note for slave in slaves.values() for note in slave.notes]
+    time = ticks.start + np.arange(ticks.count + 1) * ticks.h
+    return Result(system.description.name, time, exchange.columns(), exchange.units(), tuple(notes))
+
+
+def _ticks(system: System, start: float | None, stop: float | None, h: float | None) -> Ticks:
+    """Communication points that reach the stop time."""
+    described = system.description
+    start = start if start is not None else described.start_time or 0.0
+    stop = stop if stop is not None else described.stop_time
+    h = h if h is not None else described.step
+    if h is None:
+        experiments = [part.model.defaultExperiment for part in system.parts]
+        h = min((float(e.stepSize) for e in experiments if e is not None and e.stepSize), default=None)
+    missing = [name for name, value in (("stop_time", stop), ("step", h)) if value is None]
+    if stop is None or h is None:
+        raise ValueError(f"{system.path} does not say {' and '.join(missing)}: give {' and '.join(missing)}")
+    if not (math.isfinite(start) and math.isfinite(stop) and h > 0 and math.isfinite(h) and stop > start):
+        raise ValueError(f"cannot run from {start} s to {stop} s in steps of {h} s")
+    count = (stop - start) / h
+    if count > MOST_TICKS:
+        raise ValueError(f"{count:.3g} steps of {h:g} s are too many; are the times in seconds?")
+    return Ticks(start, h, max(1, math.ceil(count - 1e-6)))  # rounding of stop / h is no further step
+
+
+def _is_sampled(part: Part) -> bool:
+    outputs = [variable for variable in part.model.modelVariables if variable.causality == "output"]
+    return all(variable.variability == "discrete" or variable.type != "Real" for variable in outputs)
+
+
+class _Schedule:
+    """The order of each phase of a tick, and of initialisation. notes: where loops are broken."""
+
+    def __init__(self, system: System, jacobi: bool) -> None:
+        names = [part.name for part in system.parts]
+        edges = {(link.source[0], link.target[0]) for link in system.links}
+        sampled = [part.name for part in system.parts if _is_sampled(part)]
+        self.jacobi = jacobi
+        self.initial, _ = signal_flow(names, edges)
+        self.sampled, broken = signal_flow(sampled, edges)
+        self.continuous, broken_too = signal_flow([name for name in names if name not in sampled], edges)
+        self.notes = [
+            f"loop of connections: {link} carries the value from before the step"
+            for link in system.links
+            if not jacobi and (link.source[0], link.target[0]) in (*broken, *broken_too)
+        ]
+
+
+def _period_notes(system: System, settings: Sequence[Setting], h: float) -> list[str]:
+    """Sampled blocks whose samples do not fall on communication points."""
+    notes = []
+    for name, interface in system.interfaces.items():
+        variable = interface.variables.get("sample_period")
+        if variable is None or variable.start is None:
+            continue
+        given = [s.value for s in settings if s.component == name and s.variable.name == "sample_period"]
+        period = float(given[0] if given else variable.start)
+        if period <= 0 or round(period / h) < 1 or abs(period / h - round(period / h)) > 1e-6:
+            notes.append(
+                f"{name}: samples every {period:g} s, inputs every {h:g} s: some samples see older inputs; "
+                "let the sample period be a whole multiple of the step"
+            )
+    return notes
+
+
+def _start(parts: Sequence[Part], stack: ExitStack) -> dict[str, Slave]:
+    """Instances of all components, by name; the stack closes them and deletes what was unpacked."""
+    scratch = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="imufmu_run_", ignore_cleanup_errors=True)))
+    if not _PLAIN_PATH.fullmatch(str(scratch)):
+        raise SimulationError(f"FMUs do not understand the path {scratch}; let TMPDIR name a folder in plain letters")
+    stack.callback(_forget_paths, scratch)
+    unpacked: dict[Path, tuple[Path, Path]] = {}
+    slaves = {}
+    for part in parts:
+        if part.fmu not in unpacked:
+            folder = scratch / str(len(unpacked))
+            folder.mkdir()
+            unpacked[part.fmu] = (open_fmu(part.fmu, folder)[0], folder)
+        slave = Slave(part.name, *unpacked[part.fmu], part.model)
+        stack.callback(slave.close)
+        slaves[part.name] = slave
+    return slaves
+
+
+def _forget_paths(folder: Path) -> None:
+    """Python FMUs put their folders on the import path and leave them there."""
+    sys.path[:] = [entry for entry in sys.path if not Path(entry).is_relative_to(folder)]
+
+
+def _initialise(
+    slaves: Mapping[str, Slave], schedule: _Schedule, exchange: Exchange, settings: Sequence[Setting], time: float
+) -> list[str]:
+    """Start values, then outputs exchanged until they settle."""
+    for name, slave in slaves.items():
+        slave.enter_initialisation([setting for setting in settings if setting.component == name], time)
+    settled = False
+    for _ in range(len(slaves) + 1):
+        before = {kind: values.copy() for kind, values in exchange.values.items()}
+        for name in schedule.initial:
+            slaves[name].gather()
+            slaves[name].write(time)
+            slaves[name].read_initial(time)
+        settled = all(np.array_equal(before[kind], values) for kind, values in exchange.values.items())
+        if settled:
+            break
+    for name in schedule.initial:
+        slaves[name].exit_initialisation(time)
+        slaves[name].read(time)
+    return [] if settled else [f"outputs did not settle in {len(slaves) + 1} exchanges during initialisation"]
+
+
+def _run(
+    slaves: Mapping[str, Slave],
+    schedule: _Schedule,
+    exchange: Exchange,
+    ticks: Ticks,
+    check: Callable[[], None],
+    progress: Progress | None,
+) -> None:
+    """All ticks; every row recorded."""
+    sampled = [slaves[name] for name in schedule.sampled]
+    continuous = [slaves[name] for name in schedule.continuous]
+    h, reported = ticks.h, clock.monotonic()
+    for k in range(ticks.count):
+        t = ticks.time(k)
+        if schedule.jacobi:
+            for slave in slaves.values():
+                slave.gather()
+        for slave in sampled:
+            _advance(slave, t, h, t, not schedule.jacobi)
+        exchange.record(k)
+        for slave in continuous:
+            _advance(slave, t, h, ticks.time(k + 1), not schedule.jacobi)
+        check()
+        if progress and (k + 1 == ticks.count or clock.monotonic() - reported > _BETWEEN_PROGRESS):
+            progress(k + 1, ticks.count)
+            reported = clock.monotonic()
+    exchange.record(ticks.count)
+
+
+def _advance(slave: Slave, t: float, h: float, reached: float, gather: bool) -> None:
+    if gather:
+        slave.gather()
+    slave.write(t)
+    slave.step(t, h)
+    slave.read(reached)

@@ -1,0 +1,77 @@
+"""What FMUs log, kept per instance.
+
+fmpy's proxy, which formats C messages, knows one logger per process: the last one installed. So there is one here too;
+it tells instances apart by the environment that they were given, and prints what is not from an instance of ours.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from ctypes import byref
+from itertools import count
+from typing import Any
+
+import fmpy
+from fmpy.fmi1 import printLogMessage
+from fmpy.fmi2 import (
+    fmi2CallbackAllocateMemoryTYPE,
+    fmi2CallbackFreeMemoryTYPE,
+    fmi2CallbackFunctions,
+    fmi2CallbackLoggerTYPE,
+    fmi2OK,
+)
+from fmpy.logging import addLoggerProxy
+
+_LATEST = 3  # messages quoted with an error
+_MOST_WARNINGS = 50  # different warnings kept of one instance
+_environments = count(1)
+_listening: dict[int, Messages] = {}
+
+
+class Messages:
+    """The messages of one FMU instance. ``callbacks`` is what the instance must be given; call ``close`` in the end."""
+
+    def __init__(self) -> None:
+        self._environment = next(_environments)
+        self._complaints: deque[str] = deque(maxlen=_LATEST)
+        self._remarks: deque[str] = deque(maxlen=_LATEST)
+        self._warnings: dict[str, None] = {}
+        self.callbacks = fmi2CallbackFunctions(
+            logger=_LOGGER,
+            allocateMemory=_ALLOCATE,
+            freeMemory=_FREE,
+            componentEnvironment=self._environment,
+        )
+        addLoggerProxy(byref(self.callbacks))
+        _listening[self._environment] = self
+
+    def close(self) -> None:
+        _listening.pop(self._environment, None)
+
+    def add(self, status: int, text: str) -> None:
+        (self._remarks if status == fmi2OK else self._complaints).append(text)
+        if status != fmi2OK and len(self._warnings) < _MOST_WARNINGS:
+            self._warnings[text] = None
+
+    @property
+    def warnings(self) -> list[str]:
+        """Different messages with a status other than OK, in order."""
+        return list(self._warnings)
+
+    @property
+    def latest(self) -> str:
+        """The last complaints, or the last remarks if there was no complaint; empty if the FMU said nothing."""
+        return "; ".join(self._complaints or self._remarks)
+
+
+def _receive(environment: int | None, instance: bytes, status: int, category: bytes, message: bytes) -> None:
+    listener = _listening.get(environment or 0)
+    if listener is None:
+        printLogMessage(environment, instance, status, category, message)
+    else:
+        listener.add(status, (message or b"").decode(errors="replace").strip())
+
+
+_LOGGER: Any = fmi2CallbackLoggerTYPE(_receive)
+_ALLOCATE: Any = fmi2CallbackAllocateMemoryTYPE(fmpy.calloc)
+_FREE: Any = fmi2CallbackFreeMemoryTYPE(fmpy.free)

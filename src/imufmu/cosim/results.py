@@ -1,0 +1,138 @@
+"""Results of a run: columns by name, and files of them.
+
+HDF5 because Python, MATLAB (h5read) and Julia read it with what they come with or one package, and units travel along.
+"""
+
+from __future__ import annotations
+
+import csv
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+import h5py
+import numpy as np
+
+from ..files import atomic_write
+from .interface import near
+
+_ELEMENT = re.compile(r"(.+)\[(\d+(?:,\d+)*)\]")
+
+
+@dataclass(frozen=True, eq=False)
+class Result:
+    """Variables over communication points.
+
+    system: its name. time: (n,), s. columns: (n,) by ``component.variable``, float64, or int32 for Integer and Boolean
+    variables. units: by the same names; None where the FMU does not say. notes: what a user should know about the run.
+
+    A row holds the values of its time; outputs of sampled FMUs are those of the sample taken then (the last row: held).
+    """
+
+    system: str
+    time: np.ndarray
+    columns: Mapping[str, np.ndarray]
+    units: Mapping[str, str | None]
+    notes: tuple[str, ...] = ()
+
+    @property
+    def names(self) -> list[str]:
+        return list(self.columns)
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        """(n,) of a variable; (n, k) or (n, k, m) of a vector or matrix by its name without brackets."""
+        if name in self.columns:
+            return self.columns[name]
+        if name not in self._arrays:
+            raise KeyError(f"{name!r} was not recorded. Near: {near(name, [*self.columns, *self._arrays])}")
+        shape = self._arrays[name]
+        elements = [self.columns[_element(name, index)] for index in np.ndindex(shape)]
+        return np.stack(elements, axis=-1).reshape(-1, *shape)
+
+    def __contains__(self, name: str) -> bool:
+        return name in self.columns or name in self._arrays
+
+    @cached_property
+    def _arrays(self) -> dict[str, tuple[int, ...]]:
+        """Shapes of the vectors and matrices whose every element was recorded."""
+        highest: dict[str, tuple[int, ...]] = {}
+        for column in self.columns:
+            match = _ELEMENT.fullmatch(column)
+            if match:
+                index = tuple(map(int, match[2].split(",")))
+                largest = highest.get(match[1], index)
+                highest[match[1]] = tuple(map(max, index, largest)) if len(largest) == len(index) else ()
+        return {
+            name: shape
+            for name, shape in highest.items()
+            if shape and all(_element(name, index) in self.columns for index in np.ndindex(shape))
+        }
+
+    def as_array(self) -> np.ndarray:
+        """Structured array (n,) with the fields ``time`` and one per column."""
+        table = np.empty(len(self.time), [("time", float), *((name, c.dtype) for name, c in self.columns.items())])
+        table["time"] = self.time
+        for name, column in self.columns.items():
+            table[name] = column
+        return table
+
+    def to_csv(self, path: str | Path) -> None:
+        """Write a table with one header line (``time`` and the columns) that holds every number exactly."""
+        formats = ["%.17g", *("%d" if c.dtype.kind == "i" else "%.17g" for c in self.columns.values())]
+        with atomic_write(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
+            csv.writer(file, lineterminator="\n").writerow(["time", *self.columns])
+            np.savetxt(file, self.as_array(), fmt=",".join(formats))
+
+    def to_hdf5(self, path: str | Path) -> None:
+        """Write ``/time`` and one dataset per variable, ``/component/variable``; a vector is one dataset (n, k).
+
+        Each dataset has the attribute ``unit`` where the FMU names one; the file has ``system`` and ``notes``.
+        """
+        with atomic_write(path) as temporary, h5py.File(temporary, "w", track_order=True) as file:
+            file.attrs["system"] = self.system
+            file.attrs["notes"] = list(self.notes)
+            file.create_dataset("time", data=self.time).attrs["unit"] = "s"
+            for name, first in self._datasets():
+                dataset = file.create_dataset(name.replace(".", "/", 1), data=self[name], track_order=True)
+                if self.units[first] is not None:
+                    dataset.attrs["unit"] = self.units[first]
+
+    def _datasets(self) -> Iterator[tuple[str, str]]:
+        """Names of whole vectors and of other columns, in order, each with its first column."""
+        written = set()
+        for column in self.columns:
+            match = _ELEMENT.fullmatch(column)
+            name = match[1] if match and match[1] in self._arrays else column
+            if name not in written:
+                written.add(name)
+                yield name, column
+
+
+def read_hdf5(path: str | Path) -> Result:
+    """Read what ``Result.to_hdf5`` wrote. Raises ValueError for any other file."""
+    columns: dict[str, np.ndarray] = {}
+    units: dict[str, str | None] = {}
+
+    def take(name: str, item: h5py.HLObject) -> None:
+        if not isinstance(item, h5py.Dataset) or name == "time":
+            return
+        values, full_name = item[()], name.replace("/", ".", 1)
+        for index in np.ndindex(values.shape[1:]):
+            column = _element(full_name, index) if index else full_name
+            columns[column] = np.ascontiguousarray(values[(slice(None), *index)])
+            units[column] = item.attrs.get("unit")
+
+    try:
+        with h5py.File(path, "r", track_order=True) as file:
+            time = file["time"][()]
+            file.visititems(take)
+            return Result(str(file.attrs["system"]), time, columns, units, tuple(map(str, file.attrs["notes"])))
+    except (OSError, KeyError, IndexError, AttributeError) as error:
+        raise ValueError(f"{path}: cannot be read as a result: {error}") from error
+
+
+def _element(name: str, index: tuple[int, ...]) -> str:
+    """Name of the element with an index that counts from 0."""
+    return f"{name}[{','.join(str(i + 1) for i in index)}]"

@@ -1,0 +1,208 @@
+"""One FMU instance at work: its calls, its buffers, and what it says when it fails.
+
+Values of all components lie in one array per kind (Real, Integer, Boolean). A slave reads its variables into a part of
+each array with one call and sets its inputs, gathered from these arrays, with one call.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from ctypes import POINTER, c_double, c_int, c_uint
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from fmpy.fmi1 import FMICallException
+from fmpy.fmi2 import FMU2Slave, fmi2Discard, fmi2Fatal, fmi2True, fmi2Warning
+
+from .messages import Messages
+from .settings import Setting
+
+DTYPES: dict[str, Any] = {"Real": np.float64, "Integer": np.int32, "Boolean": np.int32}
+_POINTERS: dict[str, Any] = {"Real": POINTER(c_double), "Integer": POINTER(c_int), "Boolean": POINTER(c_int)}
+
+
+class SimulationError(RuntimeError):
+    """A run cannot go on; the message names component, call, time and what the FMU said."""
+
+
+@dataclass(frozen=True)
+class Outlet:
+    """Variables of one kind that are read together into ``values``; the first ``outputs`` of them are outputs."""
+
+    kind: str
+    variables: Sequence[Any]
+    outputs: int
+    values: np.ndarray
+
+
+@dataclass(frozen=True)
+class Inlet:
+    """Inputs of one kind that are set together: factor * pool[sources] + offset, each (n,)."""
+
+    kind: str
+    variables: Sequence[Any]
+    pool: np.ndarray
+    sources: np.ndarray
+    factor: np.ndarray
+    offset: np.ndarray
+
+
+class Slave:
+    """An FMU instance, from instantiation to ``close``. Every failure is a SimulationError.
+
+    library, folder: its shared library, and where the FMU is unpacked. model: its ModelDescription (fmpy).
+    """
+
+    def __init__(self, name: str, library: Path, folder: Path, model: Any) -> None:
+        self.name = name
+        self._messages = Messages()
+        self._may_terminate = self._lost = False
+        self._instance: Any = None
+        folder_before = os.getcwd()
+        try:
+            self._fmu = FMU2Slave(
+                guid=model.guid,
+                modelIdentifier=model.coSimulation.modelIdentifier,
+                unzipDirectory=str(folder),
+                instanceName=name,
+                libraryPath=str(library),
+            )
+        except Exception as error:  # fmpy raises plain exceptions, and AttributeError for a missing function
+            os.chdir(folder_before)  # fmpy loads libraries in their folder, and stays there when that fails
+            self._messages.close()
+            raise SimulationError(f"{name}: its binary cannot be loaded: {error}") from error
+        try:
+            self._fmu.instantiate(callbacks=self._messages.callbacks, loggingOn=True)
+        except Exception as error:  # as above
+            said = self._messages.latest
+            self._messages.close()
+            self._fmu.freeLibrary()
+            raise SimulationError(f"{name}: cannot be instantiated{_quoted(said)}") from error
+        self._instance = self._fmu.component
+        self._gets: list[tuple[Callable[..., int], Any, int, int, Any]] = []
+        self._sets: list[tuple[Callable[..., int], Any, int, Any]] = []
+        self._gathers: list[tuple[Inlet, np.ndarray]] = []
+        self._reals: list[Outlet] = []
+        self._warned = False
+
+    def connect(self, outlets: Sequence[Outlet], inlets: Sequence[Inlet]) -> None:
+        """Prepare the calls of ``read``, ``gather`` and ``write``."""
+        for outlet in outlets:
+            call = getattr(self._fmu, f"fmi2Get{outlet.kind}")
+            pointer = outlet.values.ctypes.data_as(_POINTERS[outlet.kind])
+            count = len(outlet.variables)
+            self._gets.append((call, _references(outlet.variables), outlet.outputs, count, pointer))
+            if outlet.kind == "Real":
+                self._reals.append(outlet)
+        for inlet in inlets:
+            call = getattr(self._fmu, f"fmi2Set{inlet.kind}")
+            buffer = np.zeros(len(inlet.variables), DTYPES[inlet.kind])
+            pointer = buffer.ctypes.data_as(_POINTERS[inlet.kind])
+            self._gathers.append((inlet, buffer))
+            self._sets.append((call, _references(inlet.variables), len(inlet.variables), pointer))
+
+    def enter_initialisation(self, settings: Sequence[Setting], start_time: float) -> None:
+        """Apply the start values and enter initialization mode."""
+        setters = {float: self._fmu.setReal, bool: self._fmu.setBoolean, int: self._fmu.setInteger}
+        for setting in settings:
+            try:
+                setters.get(type(setting.value), self._fmu.setString)(
+                    [setting.variable.valueReference], [setting.value]
+                )
+            except FMICallException as error:
+                raise self._failure(error, f"{setting.variable.name} = {setting.value}") from None
+        try:
+            self._fmu.setupExperiment(startTime=start_time)
+            self._fmu.enterInitializationMode()
+        except FMICallException as error:
+            raise self._failure(error, f"t = {start_time:g} s") from None
+
+    def exit_initialisation(self, time: float) -> None:
+        try:
+            self._fmu.exitInitializationMode()
+        except FMICallException as error:
+            raise self._failure(error, f"t = {time:g} s") from None
+        self._may_terminate = True
+
+    def gather(self) -> None:
+        """Take the inputs from the present values of their sources."""
+        for inlet, buffer in self._gathers:
+            np.take(inlet.pool, inlet.sources, out=buffer, mode="clip")
+            if inlet.kind == "Real":
+                buffer *= inlet.factor
+                buffer += inlet.offset
+
+    def write(self, time: float) -> None:
+        """Hand the gathered inputs to the FMU."""
+        try:
+            for call, references, count, buffer in self._sets:
+                call(self._instance, references, count, buffer)
+        except FMICallException as error:
+            raise self._failure(error, f"t = {time:g} s") from None
+
+    def step(self, time: float, h: float) -> None:
+        """From time to time + h."""
+        try:
+            status = self._fmu.fmi2DoStep(self._instance, time, h, fmi2True)
+        except FMICallException as error:
+            raise self._failure(error, f"t = {time:g} s, step {h:g} s") from None
+        if status == fmi2Warning and not self._warned:
+            self._warned = True
+            self._messages.add(status, f"fmi2DoStep at t = {time:g} s returned a warning")
+
+    def read(self, time: float) -> None:
+        """Get the variables; none may be other than finite."""
+        try:
+            for call, references, _, count, values in self._gets:
+                call(self._instance, references, count, values)
+        except FMICallException as error:
+            raise self._failure(error, f"t = {time:g} s") from None
+        for outlet in self._reals:
+            finite = np.isfinite(outlet.values)
+            if not finite.all():
+                i = int(np.argmin(finite))
+                raise SimulationError(
+                    f"{self.name}.{outlet.variables[i].name} = {outlet.values[i]} at t = {time:g} s"
+                    + _quoted(self._messages.latest)
+                )
+
+    def read_initial(self, time: float) -> None:
+        """Get the outputs during initialisation, where FMI allows no other variable."""
+        try:
+            for call, references, outputs, _, values in self._gets:
+                if outputs:
+                    call(self._instance, references, outputs, values)
+        except FMICallException as error:
+            raise self._failure(error, f"t = {time:g} s") from None
+
+    @property
+    def notes(self) -> list[str]:
+        """What the FMU warned of."""
+        return [f"{self.name}: {text}" for text in self._messages.warnings]
+
+    def close(self) -> None:
+        """Terminate and free the instance, as far as FMI allows after what happened."""
+        if not self._lost:
+            with suppress(FMICallException):
+                if self._may_terminate:
+                    self._fmu.terminate()
+            self._fmu.freeInstance()
+        self._messages.close()
+
+    def _failure(self, error: FMICallException, at: str) -> SimulationError:
+        """The error to raise; also remembers which calls are still allowed."""
+        self._lost = self._lost or error.status == fmi2Fatal
+        self._may_terminate = self._may_terminate and error.status == fmi2Discard
+        return SimulationError(f"{self.name}: {error.args[0].rstrip('.')} at {at}{_quoted(self._messages.latest)}")
+
+
+def _references(variables: Sequence[Any]) -> Any:
+    return (c_uint * len(variables))(*(variable.valueReference for variable in variables))
+
+
+def _quoted(said: str) -> str:
+    return f": {said}" if said else "; the FMU gave no reason"

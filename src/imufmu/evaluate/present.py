@@ -1,0 +1,72 @@
+"""What a user sees after a run or a replay: a table, and on request a figure and a report."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from ..cosim import Result
+from ..cosim.replay import Replay
+from ..running import Trajectory
+from . import metrics
+from .figures import attitude_figure, save
+from .report import Section, Table, write_report
+from .systems import comparisons
+from .tables import range_table, summary_table
+
+
+def present_run(result: Result, figure: Path | None = None, report: Path | None = None) -> Table:
+    """Errors of every estimator of the system, or the ranges of all variables where there is nothing to compare.
+
+    Writes a figure and an HTML report where paths are given. Raises WriteError, and ValueError where a figure is asked
+    for but the system has no truth and estimator.
+    """
+    found = comparisons(result)
+    if not found:
+        if figure or report:
+            raise ValueError(
+                f"{result.system}: no figure: the system has no plant with a truth and estimator to compare"
+            )
+        return range_table(dict(result.columns), {name: unit or "" for name, unit in result.units.items()})
+    table = summary_table("estimator", {c.component: c.summary for c in found})
+    drawn = attitude_figure(
+        result.system,
+        found[0].truth,
+        {c.component: c.estimate for c in found},
+        {c.component: (c.estimate.time, c.errors) for c in found},
+    )
+    if figure:
+        save(drawn, figure)
+    if report:
+        seconds = result.time[-1] - result.time[0]
+        sections = [
+            Section("Errors", "Against the plant's truth, at the instants of the samples.", table),
+            Section("Run", figure=drawn, caption="Truth and estimates; tilt error; norm of the external acceleration."),
+            *([Section("Notes", "; ".join(result.notes))] if result.notes else []),
+        ]
+        write_report(report, result.system, f"Co-simulation of FMUs over {seconds:g} s.", sections)
+    return table
+
+
+def present_replay(replay: Replay, figure: Path | None = None) -> Table:
+    """Errors over the scored samples, or the ranges of all outputs where the recording has no truth.
+
+    Writes a figure where a path is given. Raises WriteError.
+    """
+    recording, signals = replay.recording, replay.signals()
+    scored = recording.scored
+    errors = {}
+    if scored.any() and recording.truth.keys() & signals.keys():
+        errors = metrics.errors(metrics.at_rows(signals, scored), metrics.at_rows(recording.truth, scored))
+    if figure:
+        estimate = Trajectory(recording.time, signals)
+        truth = Trajectory(recording.time, recording.truth) if recording.truth else None
+        drawn = attitude_figure(
+            recording.name,
+            truth,
+            {replay.estimator: estimate},
+            {replay.estimator: (recording.time[scored], errors)} if errors else {},
+        )
+        save(drawn, figure)
+    if errors:
+        return summary_table("estimator", {replay.estimator: metrics.summary(errors)})
+    return range_table(replay.columns, replay.units)

@@ -1,0 +1,54 @@
+"""Self-contained HTML reports: no script, no link to anything outside the file."""
+
+from __future__ import annotations
+
+import base64
+import platform
+from collections.abc import Sequence
+from dataclasses import dataclass
+from importlib.metadata import version
+from pathlib import Path
+
+from jinja2 import Environment, PackageLoader, StrictUndefined
+from matplotlib.figure import Figure
+
+from .. import __version__
+from ..files import atomic_write
+from .figures import png
+
+
+@dataclass(frozen=True)
+class Table:
+    """Cells as shown. The first column names the row; ``words``: the other cells are words, not numbers."""
+
+    columns: Sequence[str]
+    rows: Sequence[Sequence[str]]
+    words: bool = False
+
+
+@dataclass(frozen=True)
+class Section:
+    """One part of a report; what is empty is left out."""
+
+    heading: str
+    text: str = ""
+    table: Table | None = None
+    figure: Figure | None = None
+    caption: str = ""
+
+
+def write_report(path: Path, title: str, lead: str, sections: Sequence[Section]) -> None:
+    """Write the page, whole or not at all. Raises WriteError."""
+    environment = Environment(loader=PackageLoader("imufmu.evaluate"), autoescape=True, undefined=StrictUndefined)
+    shown = [
+        (section, base64.b64encode(png(section.figure)).decode() if section.figure else "") for section in sections
+    ]
+    page = environment.get_template("report.html").render(
+        title=title,
+        lead=lead,
+        sections=shown,
+        made_with=f"imufmu {__version__}, Python {platform.python_version()}, CasADi {version('casadi')}, "
+        f"FMPy {version('fmpy')}, {platform.system()} {platform.machine()}",
+    )
+    with atomic_write(path) as temporary:
+        temporary.write_text(page, encoding="utf-8")

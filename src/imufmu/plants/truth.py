@@ -1,0 +1,63 @@
+"""What every plant says about a sensor on it, from the motion of the mounting point.
+
+    r_N, v_N, a_N   position (m), velocity (m/s), acceleration (m/s2) of the mounting point, in N
+    q_NS, R_NS      attitude, sensor to navigation (Z up)
+    w_S             angular velocity of S relative to N, in S (rad/s)
+    B_N             magnetic flux density, in N (uT)
+
+    f_S = R_SN (a_N + g e_z)    specific force: +g on the axis that points up at rest
+    B_S = R_SN B_N              the field is the same everywhere
+
+N counts as inertial: the Earth's rotation and the change of gravity with height are left out.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from .. import vocabulary as v
+from ..block import Expressions
+from ..rotations import euler_from_quaternion, matrix_from_quaternion
+from ..signals import Parameter, Signal, real
+
+OUTPUTS: tuple[Signal, ...] = (*v.TRUTH, *v.IDEAL_IMU)
+
+# Near the middle of Europe, 50 deg N 10 deg E at sea level, at the start of 2025: International Geomagnetic Reference
+# Field, 14th generation (IAGA), to 0.1 uT. Declination 4 deg East, dip 66 deg.
+MID_EUROPE = (1.4, 20.1, -44.9)
+
+PARAMETERS: tuple[Parameter, ...] = (
+    real("g", "m/s2", v.GRAVITY, (0, 100), "Magnitude of gravity"),
+    real(
+        "earth_field",
+        "uT",
+        MID_EUROPE,
+        (-1e3, 1e3),
+        "Magnetic flux density East, North, Up; start: mid-Europe, IGRF-14, 2025",
+        shape=(3,),
+    ),
+)
+
+
+def truth(q_NS: Any, w_S: Any, r_N: Any, v_N: Any, a_N: Any, g: Any, B_N: Any) -> Expressions:
+    """Expressions by name for OUTPUTS.
+
+    q_NS: (4,), of unit length. w_S, r_N, v_N, a_N, B_N: (3,). g: scalar, m/s2. Units and frames as in the module.
+    """
+    roll, pitch, yaw = euler_from_quaternion(q_NS)
+    R_SN = matrix_from_quaternion(q_NS).T
+    up_S = R_SN[:, 2]
+    a_S = R_SN @ a_N
+    return dict(
+        roll=roll,
+        pitch=pitch,
+        yaw=yaw,
+        q_NS=q_NS,
+        vertical=up_S,
+        external_acceleration=a_S,
+        position=r_N,
+        velocity=v_N,
+        angular_velocity=w_S,
+        specific_force=a_S + g * up_S,
+        magnetic_field=R_SN @ B_N,
+    )
