@@ -63,6 +63,8 @@ class Clock(Stub):
 class Sampler(Stub):
     def __init__(self, **kwargs):
         super().__init__(**kwargs)
+        self.add(Real, "inside[1]", LOCAL, DISCRETE)
+        self.add(Real, "inside[2]", LOCAL, DISCRETE)
         self.add(Real, "u", IN)
         self.add(Integer, "n", IN, DISCRETE)
         self.add(Boolean, "b", IN, DISCRETE, False)
@@ -70,8 +72,6 @@ class Sampler(Stub):
         self.add(Integer, "m", OUT, DISCRETE)
         self.add(Boolean, "c", OUT, DISCRETE, False)
         self.add(Real, "sample_time", OUT, DISCRETE)
-        self.add(Real, "inside[1]", LOCAL, DISCRETE)
-        self.add(Real, "inside[2]", LOCAL, DISCRETE)
         self.add(Real, "sample_period", PARAMETER, FIXED, 0.25)
 
     def do_step(self, t, h):

@@ -75,6 +75,15 @@ def test_links_special_files_and_repeated_names_are_refused(tmp_path: Path) -> N
     assert "twice" in refusal(tmp_path / "b.ssp", tmp_path / "target")
 
 
+def test_an_encrypted_member_is_refused(tmp_path: Path) -> None:
+    archive = write_zip(tmp_path / "a.ssp", {"secret": "x"})
+    content = bytearray(archive.read_bytes())
+    for header, flags in ((b"PK\x03\x04", 6), (b"PK\x01\x02", 8)):  # where each header of a member says so
+        content[content.index(header) + flags] |= 1
+    archive.write_bytes(content)
+    assert "member 'secret' refused: encrypted" in refusal(archive, tmp_path / "target")
+
+
 def test_a_zip_bomb_is_refused_by_its_declared_size(tmp_path: Path) -> None:
     bomb = tmp_path / "bomb.ssp"
     with zipfile.ZipFile(bomb, "w", zipfile.ZIP_DEFLATED) as writer, writer.open("zeros", "w") as member:

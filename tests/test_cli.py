@@ -13,7 +13,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from imufmu import cli, recordings
+from imufmu import cli
+from imufmu.tables import write_csv
 
 
 @pytest.fixture
@@ -46,7 +47,7 @@ def walk(tmp_path):
         "roll": np.zeros(n),
         "pitch": np.zeros(n),
     }
-    recordings.write_csv(tmp_path / "walk.csv", columns)
+    write_csv(tmp_path / "walk.csv", columns)
     return tmp_path / "walk.csv"
 
 

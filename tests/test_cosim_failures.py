@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import gc
+import platform
 import signal
 import sys
 import tempfile
 import threading
 from collections.abc import Iterator
+from ctypes import CFUNCTYPE, c_char_p, c_int, c_void_p, cast
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +17,7 @@ import fmpy.fmi1
 import pytest
 from cosim_stubs import LIBRARY, fake_fmu, model_description, stub, variable, write_ssd, write_zip
 
-from imufmu.cosim import SimulationError, System, master, pack, simulate
+from imufmu.cosim import DescriptionError, SimulationError, System, master, pack, simulate
 from imufmu.cosim.messages import Messages, _listening, _receive
 
 
@@ -104,6 +106,7 @@ def test_an_fmu_that_cannot_be_instantiated_is_named(tmp_path: Path, calls: list
     with pytest.raises(SimulationError, match=r"^born: cannot be instantiated"):
         simulate(write_ssd(tmp_path / "system.ssd", parts))
     assert ("clock", "fmi2FreeInstance") in calls
+    assert ("clock", "fmi2Terminate") not in calls  # it was never initialised
     assert ("born", "fmi2FreeInstance") not in calls
 
 
@@ -139,6 +142,11 @@ def test_ctrl_c_ends_the_run_and_frees_every_instance(
     assert calls.count(("clock", "fmi2DoStep")) == 2  # the step that was under way, and the next one at most
     for name in ("clock", "faulty", "sampler"):
         assert ends(calls, name)[-2:] == ["fmi2Terminate", "fmi2FreeInstance"]
+
+
+def test_ctrl_c_after_the_last_step_is_not_lost(tmp_path: Path) -> None:
+    with pytest.raises(KeyboardInterrupt):
+        simulate(system(tmp_path), progress=lambda *_: signal.raise_signal(signal.SIGINT))  # reports the end only
 
 
 def test_ctrl_c_inside_a_python_fmu_is_no_fault_of_the_fmu(tmp_path: Path) -> None:
@@ -189,6 +197,12 @@ def test_an_unpacked_ssp_lives_as_long_as_its_system(tmp_path: Path) -> None:
     assert not folder.exists()
 
 
+def test_an_ssp_that_cannot_be_read_leaves_nothing(tmp_path: Path) -> None:
+    text = write_ssd(tmp_path / "a.ssd", {"a": "resources/none.fmu"}).read_text()
+    with pytest.raises(DescriptionError, match="there is no file"):
+        System.read(write_zip(tmp_path / "a.ssp", {"SystemStructure.ssd": text}))
+
+
 def test_a_temporary_folder_that_fmus_do_not_understand_is_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -203,6 +217,17 @@ def test_a_temporary_folder_that_fmus_do_not_understand_is_refused(
 def test_messages_of_other_programs_fmus_are_printed(capsys: pytest.CaptureFixture[str]) -> None:
     _receive(None, b"theirs", 1, b"logAll", b"hello")
     assert capsys.readouterr().out == "[WARNING] hello\n"
+
+
+@pytest.mark.skipif(platform.machine() not in ("x86_64", "AMD64"), reason="calls a variadic function as a plain one")
+def test_the_values_in_a_message_of_a_c_fmu_are_filled_in() -> None:
+    messages = Messages()
+    logger = CFUNCTYPE(None, c_void_p, c_char_p, c_int, c_char_p, c_char_p, c_int)(
+        cast(messages.callbacks.logger, c_void_p).value
+    )
+    logger(messages.callbacks.componentEnvironment, b"x", 1, b"", b"%d is too hot", 451)
+    assert messages.warnings == ["451 is too hot"]
+    messages.close()
 
 
 def test_messages_keep_complaints_apart_from_remarks_and_survive_bad_bytes() -> None:

@@ -90,16 +90,15 @@ def test_all_problems_are_told_at_once(tmp_path: Path) -> None:
         ),
         (
             "plant.w -> sensor.gyro",
-            "plant.w -> sensor.gyro: sensor.gyro is an output; an input is needed. Inputs of sensor in rad/s: rate",
+            "plant.w -> sensor.gyro: sensor.gyro is output; input is needed. Inputs of sensor in rad/s: rate",
         ),
         (
             "plant.torque -> sensor.rate",
-            "plant.torque -> sensor.rate: plant.torque is an input; an output is needed. Outputs of plant in rad/s: w",
+            "plant.torque -> sensor.rate: plant.torque is input; output is needed. Outputs of plant in rad/s: w",
         ),
         (
             "plant.w -> sensor.range",
-            "plant.w -> sensor.range: sensor.range is an parameter; an input is needed. "
-            "Inputs of sensor in rad/s: rate",
+            "plant.w -> sensor.range: sensor.range is parameter; input is needed. Inputs of sensor in rad/s: rate",
         ),
         (
             "plant.w_deg -> sensor.rate",
@@ -166,7 +165,6 @@ def test_a_unit_that_one_end_does_not_name_is_a_note(tmp_path: Path) -> None:
 def test_a_connector_that_contradicts_its_fmu_is_told(tmp_path: Path, name: str, xml: str, message: str) -> None:
     with pytest.raises(WiringError) as caught:
         read(tmp_path, connectors={name: xml})
-    assert [problem.split(": ", 1)[1].split(": ", 1)[-1] for problem in caught.value.problems][0].startswith(message)
     assert f"connector {name}: {message}" in caught.value.problems[0]
 
 
@@ -256,10 +254,10 @@ def test_arguments_may_name_elements_or_whole_vectors(tmp_path: Path) -> None:
     with pytest.raises(WiringError) as caught:
         system.settings_with({"sensor.v": [1, 2, 3], "sensr.v": 1, "sensor.w": 1, "sensor.level": 9})
     assert caught.value.problems == (
-        "sensor.v: 3 values for 2 elements",
-        "parameter sensr.v: sensr.v = 1: there is no component 'sensr'; there is plant, sensor",
-        "parameter sensor.w: sensor.w = 1: no parameter of its FMU. Near: v[1], v[2], armed, force",
-        "parameter sensor.level: sensor.level = 9: outside [1, 3]",
+        "parameters: sensor.v: 3 values for 2 elements",
+        "parameters: sensr.v = 1: there is no component 'sensr'; there is plant, sensor",
+        "parameters: sensor.w = 1: no parameter of its FMU. Near: anything, armed, file, force",
+        "parameters: sensor.level = 9: outside [1, 3]",
     )
 
 

@@ -10,8 +10,9 @@ import pytest
 import scipy.io
 
 from imufmu.matlab import read_matlab
-from imufmu.recordings import Recording, RecordingError, read, write_csv
+from imufmu.recordings import Recording, RecordingError, read
 from imufmu.rotations import over_rows, quaternion_from_euler, vertical_from_roll_pitch
+from imufmu.tables import write_csv
 
 BROAD = sorted((Path(__file__).parents[2] / "shared" / "data" / "broad").glob("*.mat"))
 needs_broad = pytest.mark.skipif(not BROAD, reason="the BROAD recordings are not beside the checkout")

@@ -15,6 +15,7 @@ from imufmu.cosim.replay import estimator_fmu, replay
 from imufmu.estimators import lee2012
 from imufmu.fmi.build import cached_fmu
 from imufmu.running import run
+from imufmu.tables import write_csv
 
 PERIOD = 0.0035  # s, that of BROAD
 
@@ -27,9 +28,7 @@ def record(path: Path, rng: np.random.Generator, n: int = 400, keep: slice | np.
         "accel": rng.normal((0.0, 1.0, 9.7), 0.3, (n, 3)),
         **extra,
     }
-    recordings.write_csv(
-        path, {name: np.asarray(c)[slice(None) if keep is None else keep] for name, c in columns.items()}
-    )
+    write_csv(path, {name: np.asarray(c)[slice(None) if keep is None else keep] for name, c in columns.items()})
     return path
 
 
@@ -53,7 +52,7 @@ def test_golden_cases_survive_the_way_through_csv_and_fmu(case, tmp_path):
     gyro, accel = golden.columns(reference.inputs, "gyro", 3), golden.columns(reference.inputs, "acc", 3)
     p = reference.parameters
     source = tmp_path / "in.csv"
-    recordings.write_csv(source, {"time": np.arange(len(gyro)) * p["dt"], "gyro": gyro, "accel": accel})
+    write_csv(source, {"time": np.arange(len(gyro)) * p["dt"], "gyro": gyro, "accel": accel})
     parameters = {name: p[name] for name in ("mode", "c_a", "sigma_g2", "sigma_a2", "g", "eps_a", "n")}
     result = replay(recordings.read(source), cached_fmu("lee2012"), parameters, local_variables=True)
     target = tmp_path / "out.csv"

@@ -1,4 +1,4 @@
-"""Real recordings in (CSV, BROAD [1]) and tables out.
+"""Real recordings: CSV, and trials of BROAD [1].
 
 A CSV recording has one header line and then one row per sample, in SI units, in any order of columns:
 
@@ -29,7 +29,6 @@ from typing import Any
 import numpy as np
 
 from . import vocabulary as v
-from .files import atomic_write
 from .matlab import MatlabError, read_matlab
 from .rotations import angle_between, euler_from_quaternion, over_rows, vertical_from_roll_pitch
 from .sample_clock import ClockError, sample_clock
@@ -107,29 +106,6 @@ def read(path: str | os.PathLike[str]) -> Recording:
         return reader(path)
     except OSError as error:
         raise RecordingError(f"{path}: cannot read: {error.strerror or error}") from None
-
-
-def write_csv(path: str | os.PathLike[str], columns: Mapping[str, Any]) -> None:
-    """Write a table that reads back bit for bit; complete or not at all.
-
-    columns: (n,), or (n, k) for the columns name[1] .. name[k], by name. Raises ValueError if the lengths differ,
-    WriteError if the file cannot be written.
-    """
-    names: list[str] = []
-    parts = []
-    for name, values in columns.items():
-        array = np.asarray(values, dtype=float)
-        if array.ndim not in (1, 2):
-            raise ValueError(f"{name}: shape {array.shape}, expected (n,) or (n, k)")
-        names += [name] if array.ndim == 1 else [f"{name}[{i + 1}]" for i in range(array.shape[1])]
-        parts.append(array.reshape(len(array), -1))
-    lengths = {name: len(part) for name, part in zip(columns, parts, strict=True)}
-    if len(set(lengths.values())) != 1:
-        raise ValueError(f"{path}: columns must be of one length, got {lengths}")
-    with atomic_write(path) as temporary, open(temporary, "w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(names)
-        writer.writerows(np.hstack(parts).tolist())  # floats are written by repr: shortest text that reads back
 
 
 def _read_csv(path: Path) -> Recording:

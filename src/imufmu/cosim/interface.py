@@ -28,6 +28,7 @@ class Interface:
     variables: dict[str, Any]
 
     def of(self, *causalities: str) -> list[Any]:
+        """Variables of these causalities, in the order of the FMU."""
         return [variable for variable in self.variables.values() if variable.causality in causalities]
 
     def suggest(self, name: str, causality: str, unit: str | None) -> str:

@@ -13,7 +13,7 @@ from types import FrameType
 def interrupt_between_calls() -> Iterator[Callable[[], None]]:
     """Give a function that raises KeyboardInterrupt if Ctrl-C was pressed since; a second Ctrl-C interrupts at once.
 
-    Does nothing outside the main thread, or where the program handles Ctrl-C itself.
+    The end of the block checks too. Does nothing outside the main thread, or where the program handles Ctrl-C itself.
     """
     pressed = False
 
@@ -33,6 +33,7 @@ def interrupt_between_calls() -> Iterator[Callable[[], None]]:
         signal.signal(signal.SIGINT, remember)
     try:
         yield check
+        check()
     finally:
         if ours:
             signal.signal(signal.SIGINT, signal.default_int_handler)

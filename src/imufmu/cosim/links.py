@@ -104,7 +104,7 @@ def _link(connection: Connection, interfaces: Mapping[str, Interface], problems:
         elif variable is None or variable.causality != causality:
             reason = f"{component} has no variable {name}"
             if variable is not None:
-                reason = f"{component}.{name} is an {variable.causality}; an {causality} is needed"
+                reason = f"{component}.{name} is {variable.causality}; {causality} is needed"
             suggestion = interfaces[component].suggest(name, causality, unit_of(other) if other else None)
             problems.append(f"{_text(connection)}: {reason}. {suggestion}")
         else:

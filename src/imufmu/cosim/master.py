@@ -51,6 +51,7 @@ class Ticks:
     count: int
 
     def time(self, k: int) -> float:
+        """Communication point k."""
         return self.start + k * self.h
 
 

@@ -46,9 +46,11 @@ class Messages:
         _listening[self._environment] = self
 
     def close(self) -> None:
+        """Stop listening: the instance is gone."""
         _listening.pop(self._environment, None)
 
     def add(self, status: int, text: str) -> None:
+        """Keep a message with its fmi2Status."""
         (self._remarks if status == fmi2OK else self._complaints).append(text)
         if status != fmi2OK and len(self._warnings) < _MOST_WARNINGS:
             self._warnings[text] = None

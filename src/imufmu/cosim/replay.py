@@ -12,8 +12,9 @@ import numpy as np
 
 from ..archives import open_fmu
 from ..fmi.build import cached_fmu
-from ..recordings import Recording, write_csv
+from ..recordings import Recording
 from ..registry import BLOCKS, ESTIMATORS
+from ..tables import write_csv
 from ..vocabulary import ACCEL, GYRO, MAG
 from .interface import Interface, WiringError, unit_of
 from .interrupt import interrupt_between_calls

@@ -5,7 +5,6 @@ HDF5 because Python, MATLAB (h5read) and Julia read it with what they come with 
 
 from __future__ import annotations
 
-import csv
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -16,6 +15,7 @@ import h5py
 import numpy as np
 
 from ..files import atomic_write
+from ..tables import write_csv
 from .interface import near
 
 _ELEMENT = re.compile(r"(.+)\[(\d+(?:,\d+)*)\]")
@@ -39,6 +39,7 @@ class Result:
 
     @property
     def names(self) -> list[str]:
+        """Names of the columns, in the order of the description and its FMUs."""
         return list(self.columns)
 
     def __getitem__(self, name: str) -> np.ndarray:
@@ -80,10 +81,7 @@ class Result:
 
     def to_csv(self, path: str | Path) -> None:
         """Write a table with one header line (``time`` and the columns) that holds every number exactly."""
-        formats = ["%.17g", *("%d" if c.dtype.kind == "i" else "%.17g" for c in self.columns.values())]
-        with atomic_write(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
-            csv.writer(file, lineterminator="\n").writerow(["time", *self.columns])
-            np.savetxt(file, self.as_array(), fmt=",".join(formats))
+        write_csv(path, {"time": self.time, **self.columns})
 
     def to_hdf5(self, path: str | Path) -> None:
         """Write ``/time`` and one dataset per variable, ``/component/variable``; a vector is one dataset (n, k).

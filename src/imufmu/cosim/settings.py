@@ -49,9 +49,9 @@ def given_settings(
         if len(values) == 1:
             values *= len(names)
         if len(values) != len(names):
-            problems.append(f"{full_name}: {len(values)} values for {len(names)} elements")
+            problems.append(f"parameters: {full_name}: {len(values)} values for {len(names)} elements")
             continue
-        given += [(component, _as_written(n, v, full_name)) for n, v in zip(names, values, strict=True)]
+        given += [(component, _as_written(n, v)) for n, v in zip(names, values, strict=True)]
     return _checked(given, interfaces, problems)
 
 
@@ -60,10 +60,10 @@ def merged(*settings: Iterable[Setting]) -> tuple[Setting, ...]:
     return tuple({(s.component, s.variable.name): s for part in settings for s in part}.values())
 
 
-def _as_written(name: str, value: Any, where: str) -> ParameterValue:
+def _as_written(name: str, value: Any) -> ParameterValue:
     kind = {bool: "Boolean", int: "Integer", str: "String"}.get(type(value), "Real")
     text = str(value).lower() if kind == "Boolean" else str(value)
-    return ParameterValue(name, kind, text, None, f"parameter {where}")
+    return ParameterValue(name, kind, text, None, "parameters")
 
 
 def _checked(

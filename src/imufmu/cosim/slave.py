@@ -122,6 +122,7 @@ class Slave:
             raise self._failure(error, f"t = {start_time:g} s") from None
 
     def exit_initialisation(self, time: float) -> None:
+        """Leave initialization mode: the instance can step from here on."""
         try:
             self._fmu.exitInitializationMode()
         except FMICallException as error:

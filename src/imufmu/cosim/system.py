@@ -72,6 +72,7 @@ class System:
 
     @property
     def interfaces(self) -> dict[str, Interface]:
+        """What each component offers, by component name."""
         return {part.name: _interface(part) for part in self.parts}
 
     def settings_with(self, parameters: Mapping[str, Any]) -> tuple[Setting, ...]:
