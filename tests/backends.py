@@ -10,6 +10,7 @@ from collections.abc import Mapping
 from typing import Any, Protocol
 
 import numpy as np
+from backend_python_fmu import PythonFmu, Refused
 
 from imufmu.block import Block, ContinuousBlock, SampledBlock
 from imufmu.instance import StepError, instantiate
@@ -18,10 +19,6 @@ from imufmu.running import Trajectory, run, simulate
 PLANT_STEP = 0.01  # s between the rows of a continuous block
 
 Inputs = Mapping[str, np.ndarray]
-
-
-class Refused(Exception):
-    """The block reported an error instead of a result."""
 
 
 class Session(Protocol):
@@ -96,4 +93,4 @@ class InProcessSession:
         self._instance.set_state(json.loads(saved))
 
 
-BACKENDS: tuple[Backend, ...] = (InProcess(),)
+BACKENDS: tuple[Backend, ...] = (InProcess(), PythonFmu(PLANT_STEP))

@@ -59,7 +59,8 @@ class Fmu:
         for name, value in values.items():
             variable = self.variables[name]
             setter = {"Real": self.slave.setReal, "Integer": self.slave.setInteger, "Boolean": self.slave.setBoolean}
-            setter[variable.type]([variable.valueReference], [value])
+            convert = {"Real": float, "Integer": int, "Boolean": bool}[variable.type]
+            setter[variable.type]([variable.valueReference], [convert(value)])
 
     def get(self, *names: str) -> list[float]:
         return self.slave.getReal([self.variables[name].valueReference for name in names])

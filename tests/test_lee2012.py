@@ -204,10 +204,14 @@ def without_accel(motion: motions.Motion, first: int) -> dict[str, np.ndarray]:
 
 
 def test_without_accelerometer_the_gyroscope_carries_the_vertical() -> None:
-    """1 rad/s for 5 s: the first-order step of (12) turns by atan(w dt), short by (w dt)^2 / 3 of it: 1.7e-4 rad."""
+    """1 rad/s for 5 s: the first-order step of (12) turns by atan(w dt), short by (w dt)^2 / 3 of it: 1.7e-4 rad.
+
+    The external acceleration stays what it was.
+    """
     motion = motions.turn(Rotation.identity(), np.array([0.6, -0.8, 0.0]), 501)
     result = run(BLOCK, without_accel(motion, 1))
     assert angle(result["vertical"], motion.vertical)[-1] == pytest.approx(5 * 0.01**2 / 3, rel=1e-3)
+    assert np.array_equal(result["external_acceleration"], np.zeros((501, 3)))
 
 
 def test_without_accelerometer_the_error_is_bias_times_time() -> None:
@@ -225,7 +229,10 @@ def test_an_endless_gap_in_fast_rotation_stays_finite_and_ends_well(mode: int) -
     """(25) grows by 1 + (w dt)^2 a sample: without a limit the covariance overflows within 6000 samples at 35 rad/s."""
     spin = motions.turn(Rotation.identity(), np.array([35.0, 0.0, 0.0]), 8000)
     after = motions.rest(spin.R_NS[-1], 500)
-    accel = np.vstack([spin.accel + np.array([20.0, 0, 0]) if mode == 3 else np.full((8000, 3), math.nan), after.accel])
+    during = spin.accel + np.array([20.0, 0, 0])
+    if mode == 1:
+        during[1:] = math.nan
+    accel = np.vstack([during, after.accel])
     result = run(BLOCK, {"gyro": np.vstack([spin.gyro, after.gyro]), "accel": accel}, {"mode": mode})
     for name, values in result.values.items():
         assert np.isfinite(values).all(), name

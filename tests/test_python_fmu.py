@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import shutil
+import sys
 from pathlib import Path
 
 import fmu
@@ -166,6 +167,15 @@ def test_line_ends_do_not_make_another_version(tmp_path):
     for path in (tmp_path / "imufmu").rglob("*.py"):
         path.write_bytes(path.read_bytes().replace(b"\n", b"\r\n"))
     assert runtime.refusal(tmp_path) == ""
+
+
+def test_a_percent_sign_in_a_message_arrives_as_it_is():
+    """PythonFMU takes messages for C formats."""
+    instance = fmu.Fmu("lee2012")
+    slave = sys.modules["lee2012_fmu"].Lee2012(instance_name="i", resources=f"{fmu.unpacked('lee2012')}/resources")
+    slave.log("5% of %s")
+    assert slave.log_queue[-1].msg % () == "5% of %s"
+    instance.slave.freeInstance()
 
 
 def test_outputs_during_initialisation_already_follow_inputs_and_parameters():

@@ -15,7 +15,6 @@ from __future__ import annotations
 
 import math
 import re
-import sys
 import tempfile
 import time as clock
 from collections.abc import Callable, Mapping, Sequence
@@ -32,7 +31,7 @@ from .interrupt import interrupt_between_calls
 from .order import signal_flow
 from .results import Result
 from .settings import Setting
-from .slave import SimulationError, Slave
+from .slave import SimulationError, Slave, forget_paths
 from .system import Part, System, locate
 
 MOST_TICKS = 10**8  # more is taken for a wrong unit
@@ -160,7 +159,7 @@ def _start(parts: Sequence[Part], stack: ExitStack) -> dict[str, Slave]:
     scratch = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="imufmu_run_", ignore_cleanup_errors=True)))
     if not _PLAIN_PATH.fullmatch(str(scratch)):
         raise SimulationError(f"FMUs do not understand the path {scratch}; let TMPDIR name a folder in plain letters")
-    stack.callback(_forget_paths, scratch)
+    stack.callback(forget_paths, scratch)
     unpacked: dict[Path, tuple[Path, Path]] = {}
     slaves = {}
     for part in parts:
@@ -172,11 +171,6 @@ def _start(parts: Sequence[Part], stack: ExitStack) -> dict[str, Slave]:
         stack.callback(slave.close)
         slaves[part.name] = slave
     return slaves
-
-
-def _forget_paths(folder: Path) -> None:
-    """Python FMUs put their folders on the import path and leave them there."""
-    sys.path[:] = [entry for entry in sys.path if not Path(entry).is_relative_to(folder)]
 
 
 def _initialise(

@@ -19,9 +19,10 @@ from ..vocabulary import ACCEL, GYRO, MAG
 from .interface import Interface, WiringError, unit_of
 from .interrupt import interrupt_between_calls
 from .settings import Setting, given_settings
-from .slave import Inlet, Outlet, Slave
+from .slave import Inlet, Outlet, Slave, forget_paths
 
 _READINGS = {signal.name: signal for signal in (GYRO, ACCEL, MAG)}
+_BETWEEN_PROGRESS = 1000  # samples
 _SAME_PERIOD = 1e-6  # relative; a larger deviation would shift the sample clock by a sample within a minute or so
 
 
@@ -82,36 +83,21 @@ def replay(
         interface = Interface(model.modelName, {v.name: v for v in model.modelVariables})
         used, readings, notes = _inputs(interface, recording, fmu)
         settings = _settings(interface, recording, dict(parameters or {}), fmu)
-        causalities = ("output", "local") if local_variables else ("output",)
-        reported = [v for v in interface.of(*causalities) if v.type == "Real"]
-        rows = np.empty((len(readings), len(reported)))
+        outputs = [v for v in interface.of("output") if v.type == "Real"]
+        reported = outputs + [v for v in interface.of("local") if v.type == "Real" and local_variables]
         now, values = np.empty(len(used)), np.empty(len(reported))
-        start, period = float(recording.time[0]), recording.sample_period
         with interrupt_between_calls() as check:
             slave = Slave(interface.component, library, Path(folder), model)
             try:
                 sources = np.arange(len(used))
                 inlet = Inlet("Real", used, now, sources, np.ones(len(used)), np.zeros(len(used)))
-                slave.connect([Outlet("Real", reported, len(interface.of("output")), values)], [inlet])
-                slave.enter_initialisation(settings, start)
-                now[:] = readings[0]
-                slave.gather()
-                slave.write(start)
-                slave.exit_initialisation(start)
-                for k, row in enumerate(readings):
-                    check()
-                    time = start + k * period
-                    now[:] = row
-                    slave.gather()
-                    slave.write(time)
-                    slave.step(time, period)
-                    slave.read(time)
-                    rows[k] = values
-                    if progress and k % 1000 == 0:
-                        progress(k, len(readings))
+                slave.connect([Outlet("Real", reported, len(outputs), values)], [inlet])
+                clock = (float(recording.time[0]), recording.sample_period)
+                rows = _run(slave, settings, clock, readings, now, values, check, progress)
                 notes += slave.notes
             finally:
                 slave.close()
+                forget_paths(Path(folder))
     at_rows = rows[recording.sample_index]
     return Replay(
         recording,
@@ -120,6 +106,38 @@ def replay(
         {v.name: unit_of(v) or "" for v in reported},
         (*recording.notes, *notes),
     )
+
+
+def _run(
+    slave: Slave,
+    settings: tuple[Setting, ...],
+    clock: tuple[float, float],
+    readings: np.ndarray,
+    now: np.ndarray,
+    values: np.ndarray,
+    check: Callable[[], None],
+    progress: Callable[[int, int], None] | None,
+) -> np.ndarray:
+    """Values of the FMU after every row of readings; clock: start time and sample period (s)."""
+    start, period = clock
+    rows = np.empty((len(readings), len(values)))
+    slave.enter_initialisation(settings, start)
+    now[:] = readings[0]
+    slave.gather()
+    slave.write(start)
+    slave.exit_initialisation(start)
+    for k, row in enumerate(readings):
+        check()
+        time = start + k * period
+        now[:] = row
+        slave.gather()
+        slave.write(time)
+        slave.step(time, period)
+        slave.read(time)
+        rows[k] = values
+        if progress and k % _BETWEEN_PROGRESS == 0:
+            progress(k, len(readings))
+    return rows
 
 
 def _inputs(interface: Interface, recording: Recording, fmu: Path) -> tuple[list[Any], np.ndarray, list[str]]:

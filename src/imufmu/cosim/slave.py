@@ -7,6 +7,7 @@ each array with one call and sets its inputs, gathered from these arrays, with o
 from __future__ import annotations
 
 import os
+import sys
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from ctypes import POINTER, c_double, c_int, c_uint
@@ -199,6 +200,11 @@ class Slave:
         self._lost = self._lost or error.status == fmi2Fatal
         self._may_terminate = self._may_terminate and error.status == fmi2Discard
         return SimulationError(f"{self.name}: {error.args[0].rstrip('.')} at {at}{_quoted(self._messages.latest)}")
+
+
+def forget_paths(folder: Path) -> None:
+    """Python FMUs put their folders on the import path and leave them there: take those below ``folder`` off again."""
+    sys.path[:] = [entry for entry in sys.path if not Path(entry).is_relative_to(folder)]
 
 
 def _references(variables: Sequence[Any]) -> Any:

@@ -66,6 +66,10 @@ class BlockSlave(Fmi2Slave):
 
         return model_description(self.block)
 
+    def log(self, msg: str, status: Fmi2Status = Fmi2Status.ok, category: Any = None, debug: Any = None) -> None:
+        """Log a message. PythonFMU hands it on as a C format, where a percent sign would be read as a directive."""
+        super().log(msg.replace("%", "%%"), status, category)
+
     # Phases
 
     def setup_experiment(self, start_time: float, stop_time: Any = None, tolerance: Any = None) -> None:
