@@ -22,6 +22,7 @@ from imufmu.vocabulary import Status
 
 ROWS = 300
 BACKEND = pytest.mark.parametrize("backend", BACKENDS, ids=lambda backend: backend.name)
+OTHER_BACKEND = pytest.mark.parametrize("backend", BACKENDS[1:], ids=lambda backend: backend.name)
 
 # Inputs that a motion can feed, and the flag that says a reading is missing.
 OF_A_MOTION = {
@@ -155,6 +156,16 @@ def test_outputs_are_finite_with_every_parameter_at_its_bounds(block: SampledBlo
 
 
 # Repeatability
+
+
+@OTHER_BACKEND
+@EVERY
+def test_every_backend_gives_the_numbers_of_the_run_in_process(block: Block, backend: Backend) -> None:
+    """Bit for bit: all evaluate the same Functions. The noise of one seed is part of it."""
+    inputs = ordinary_inputs(block)
+    expected, actual = (b.run(block, inputs, {}, ROWS) for b in (InProcess(), backend))
+    for signal in block.reported:
+        assert np.array_equal(actual[signal.name], expected[signal.name]), signal.name
 
 
 @BACKEND

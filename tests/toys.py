@@ -63,14 +63,6 @@ MIRROR = SampledBlock(
     normals=2,
 )
 
-QUIET_MIRROR = replace(MIRROR, name="quiet_mirror", output=lambda x, u, p: _without_draws(x, u, p), normals=0)
-
-
-def _without_draws(x: Any, u: Any, p: Any) -> dict[str, Any]:
-    u.normal = ca.SX.zeros(2)
-    return dict(MIRROR.output(x, u, p))
-
-
 # q'' = -w^2 q + force + cos(t), q(0) = 1, q'(0) = 0
 OSCILLATOR = ContinuousBlock(
     name="oscillator",

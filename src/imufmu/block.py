@@ -21,7 +21,8 @@ keeps the last finite vector (at first the start value). For an input ``gyro`` a
     u.gyro_previous   the same, one sample ago
     u.gyro_missing    1 where this sample was not finite, else 0
 
-``u.normal`` holds the block's standard normal draws of this sample, where it declares any.
+``u.normal`` holds the standard normal draws of this sample, where a sampled block declares any. A continuous block has
+draws at its start only: ``p.normal`` in ``initial``.
 """
 
 from __future__ import annotations
@@ -261,17 +262,22 @@ class ContinuousBlock(Block):
     initial: Callable[..., Expressions]
     dynamics: Callable[..., Expressions]
     longest_step: float = 1e-3
+    normals: int = 0  # standard normal draws at the start
 
     def _framework_parameters(self) -> tuple[Parameter, ...]:
-        return (vocabulary.max_step(self.longest_step),)
+        max_step = vocabulary.max_step(self.longest_step)
+        return (max_step, vocabulary.SEED) if self.normals else (max_step,)
 
     @cached_property
     def initial_function(self) -> Any:
-        """CasADi Function (p) -> (x)."""
-        p = self._symbols("p", self.parameters)
-        x = self._flatten("initial", self.state, self.initial(_namespace(self.parameters, p)))
+        """CasADi Function (p, w) -> (x); w are ``normals`` uniform draws."""
+        p, w = self._symbols("p", self.parameters), ca.SX.sym("w", self.normals)
+        parameters = _namespace(self.parameters, p)
+        if self.normals:
+            parameters.normal = standard_normal(w)
+        x = self._flatten("initial", self.state, self.initial(parameters))
         held = ca.DM(self.start_vector(self.inputs))
-        return ca.Function(f"{self.name}_initial", [p], [ca.vertcat(x, held)], ["p"], ["x"])
+        return ca.Function(f"{self.name}_initial", [p, w], [ca.vertcat(x, held)], ["p", "w"], ["x"])
 
     @cached_property
     def advance_function(self) -> Any:

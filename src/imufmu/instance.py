@@ -173,11 +173,14 @@ class ContinuousInstance(Instance):
         self._t = np.zeros(1)
         self._solver_t, self._solver_h = np.zeros(1), np.zeros(1)
         self._x_next = np.zeros_like(self.x)
-        self._initial = buffered(block.initial_function, (self.p,), (self.x,))
+        self._w = np.full(block.normals, 0.5)
+        self._initial = buffered(block.initial_function, (self.p, self._w), (self.x,))
         arguments = (self.x, self.u, self.p, self._solver_t, self._solver_h)
         self._advance = buffered(block.advance_function, arguments, (self._x_next,))
         self._output = buffered(block.output_function, (self.x, self.u, self.p, self._t), (self.y,))
-        self._max_step_at = [v.name for v in block.variables if v.group == "parameter"].index("max_step")
+        names = [v.name for v in block.variables if v.group == "parameter"]
+        self._max_step_at = names.index("max_step")
+        self._seed_at = names.index("seed") if block.normals else None
 
     @property
     def time(self) -> float:
@@ -186,6 +189,8 @@ class ContinuousInstance(Instance):
     def initialise(self, start_time: float) -> None:
         super().initialise(start_time)
         self._t[0] = start_time
+        if self._seed_at is not None:
+            self._w[:] = uniforms(int(self.p[self._seed_at]), 0, 1, self.block.normals)[0]
         self._initial()
         self.refresh()
 

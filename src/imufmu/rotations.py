@@ -131,8 +131,11 @@ def angle_between(a: Any, b: Any) -> Any:
 def over_rows(expression: Callable[..., Any], *arrays: np.ndarray) -> np.ndarray:
     """Evaluate a symbolic function of vectors on every row of numeric arrays.
 
-    arrays: (n, k_i), or (n,) for a scalar argument. Returns (n, m); a tuple of results is stacked into columns.
+    arrays: (n, k_i), or (n,) for a scalar argument, n >= 1. Returns (n, m); a tuple of results is stacked into columns.
+    Raises ValueError if the arrays differ in length.
     """
+    if len({len(a) for a in arrays}) != 1:
+        raise ValueError(f"arrays of {', '.join(str(len(a)) for a in arrays)} rows; expected the same number")
     rows = [np.asarray(a, dtype=float).reshape(len(a), -1) for a in arrays]
     symbols = [ca.SX.sym(f"a{i}", a.shape[1]) for i, a in enumerate(rows)]
     result = expression(*symbols)

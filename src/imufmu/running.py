@@ -44,7 +44,7 @@ def run(
     """
     u = _input_rows(block, inputs)
     p = block.parameter_vector(parameters)
-    seed = int(dict(zip(_names(block), p, strict=True))["seed"]) if block.normals else 0
+    seed = _seed(block, p)
     n = len(u)
 
     def draws(first: int, count: int) -> np.ndarray:
@@ -89,7 +89,7 @@ def simulate(
     per_row = solver_steps(step, p[_names(block).index("max_step")])
     time = start_time + np.arange(n + 1) * step
     states = np.empty((n + 1, total_size(block.held_state)))
-    states[0] = np.array(block.initial_function(p)).ravel()
+    states[0] = np.array(block.initial_function(p, uniforms(_seed(block, p), 0, 1, block.normals)[0])).ravel()
     h = step / per_row
     t = (time[:-1, None] + np.arange(per_row) * h).reshape(-1, 1)
     u_held = np.repeat(u[:-1], per_row, axis=0)
@@ -158,6 +158,10 @@ def _chunk(function: Any) -> Any:
 def _padded(rows: np.ndarray) -> np.ndarray:
     """Rows as _CHUNK columns, the last one repeated."""
     return np.pad(rows, ((0, _CHUNK - len(rows)), (0, 0)), mode="edge").T
+
+
+def _seed(block: SampledBlock | ContinuousBlock, p: np.ndarray) -> int:
+    return int(p[_names(block).index("seed")]) if block.normals else 0
 
 
 def _names(block: Block) -> list[str]:

@@ -175,9 +175,9 @@ def _dependencies(block: Block) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         return np.zeros_like(at_start[0]), *at_start
     assert isinstance(block, ContinuousBlock)
     u, p = ca.SX.sym("u", block.output_function.numel_in(1)), ca.SX.sym("p", block.output_function.numel_in(2))
-    t = ca.SX.sym("t")
-    y = block.output_function(block.initial_function(p), u, p, t)
-    function = ca.Function("start", [u, p, t], [y])
+    t, w = ca.SX.sym("t"), ca.SX.sym("w", block.normals)
+    y = block.output_function(block.initial_function(p, w), u, p, t)
+    function = ca.Function("start", [u, p, t, w], [y])
     return _pattern(block.output_function, 1), _pattern(function, 0), _pattern(function, 1)
 
 
