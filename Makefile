@@ -1,10 +1,11 @@
 # make demo    build FMUs, co-simulate, print a table, write a figure and a report
 # make test    check style and types, run the tests
+# make test-slow    the same and the tests that take minutes
 PYTHON ?= python3.11
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: demo test clean
+.PHONY: demo test test-slow clean
 
 demo: $(VENV)/installed
 	$(BIN)/imufmu demo
@@ -14,6 +15,9 @@ test: $(VENV)/installed
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/pytest
+
+test-slow: test
+	$(BIN)/pytest -m slow
 
 $(VENV)/installed: pyproject.toml
 	$(PYTHON) -m venv $(VENV)
