@@ -32,7 +32,7 @@ class Check:
 
     @property
     def margin(self) -> float:
-        """Distance from the limit as a part of it (of the value where the limit is 0), negative where the check fails."""
+        """Distance from the limit, relative to it (to the value where it is 0); negative where the check fails."""
         room = self.limit - self.value if self.at_most else self.value - self.limit
         scale = abs(self.limit) or abs(self.value) or 1.0
         return room / scale if math.isfinite(room) else math.nan
