@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import zipfile
 from pathlib import Path
 
 import golden
@@ -10,7 +11,7 @@ import numpy as np
 import pytest
 
 from imufmu import recordings
-from imufmu.cosim import WiringError
+from imufmu.cosim import SimulationError, WiringError
 from imufmu.cosim.replay import estimator_fmu, replay
 from imufmu.estimators import lee2012
 from imufmu.fmi.build import cached_fmu
@@ -109,6 +110,23 @@ def test_an_fmu_without_gyro_and_wrong_parameters_are_refused_all_at_once(tmp_pa
         replay(recording, cached_fmu("lee2012"), {"c_b": 1, "c_a": 3.0, "mode": 1.5})
     assert len(refused.value.problems) == 3
     assert "Near: c_a" in refused.value.problems[0]
+
+
+@pytest.mark.parametrize("script", [None, b"def broken(:", b"import no_such_package_anywhere"])
+def test_a_python_fmu_whose_script_fails_is_an_error_not_a_crash(script, tmp_path, rng):
+    """PythonFMU's wrapper would end the process."""
+    broken = tmp_path / "broken.fmu"
+    with zipfile.ZipFile(cached_fmu("lee2012")) as source, zipfile.ZipFile(broken, "w") as target:
+        for member in source.namelist():
+            name = member.replace("lee2012_fmu.py", "broken_fmu.py")
+            content = {"resources/broken_fmu.py": script, "resources/slavemodule.txt": b"broken_fmu"}.get(
+                name, source.read(member)
+            )
+            if content is not None:
+                target.writestr(name, content)
+    recording = recordings.read(record(tmp_path / "r.csv", rng))
+    with pytest.raises(SimulationError, match="lee2012: its Python script fails to load"):
+        replay(recording, broken)
 
 
 def test_an_estimator_is_a_name_or_a_file():

@@ -15,9 +15,9 @@ _SUGGESTIONS = 4
 class WiringError(ValueError):
     """A description or an argument does not fit the FMUs. ``problems`` holds one line each."""
 
-    def __init__(self, system: Path, problems: Iterable[str]) -> None:
+    def __init__(self, subject: Path, problems: Iterable[str], fault: str = "does not fit its FMUs") -> None:
         self.problems = tuple(problems)
-        super().__init__("\n  ".join((f"{system} does not fit its FMUs:", *self.problems)))
+        super().__init__("\n  ".join((f"{subject} {fault}:", *self.problems)))
 
 
 @dataclass(frozen=True)

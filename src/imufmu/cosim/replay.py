@@ -163,7 +163,7 @@ def _inputs(interface: Interface, recording: Recording, fmu: Path) -> tuple[list
             used.append(variable)
             columns.append(instants[name][:, i])
     if problems:
-        raise WiringError(fmu, problems)
+        raise WiringError(fmu, problems, f"cannot replay {recording.path}")
     free = [name for name in inputs if name not in {v.name for v in used}]
     if free:
         notes.append(f"inputs not in the recording stay at their start values: {', '.join(free)}")
@@ -196,5 +196,5 @@ def _settings(interface: Interface, recording: Recording, parameters: dict[str, 
     full_names = {f"{interface.component}.{name}": value for name, value in parameters.items()}
     settings = given_settings(full_names, {interface.component: interface}, problems)
     if problems:
-        raise WiringError(fmu, problems)
+        raise WiringError(fmu, problems, f"cannot replay {recording.path}")
     return settings

@@ -99,7 +99,7 @@ def _misfit(given: ParameterValue, variable: Any) -> str:
         return f"expected a value of type {variable.type}"
     low, high = bounds_of(variable)
     if not isinstance(value, str) and not low <= value <= high:
-        return f"outside [{low:g}, {high:g}]{f' {unit}' if unit else ''}"
+        return f"outside [{low:g}, {high:g}]{f' {unit}' if unit not in (None, '1') else ''}"
     return ""
 
 

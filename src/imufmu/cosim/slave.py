@@ -6,6 +6,7 @@ each array with one call and sets its inputs, gathered from these arrays, with o
 
 from __future__ import annotations
 
+import importlib
 import os
 import sys
 from collections.abc import Callable, Sequence
@@ -63,6 +64,7 @@ class Slave:
         self._messages = Messages()
         self._may_terminate = self._lost = False
         self._instance: Any = None
+        _import_script(name, folder)
         folder_before = os.getcwd()
         try:
             self._fmu = FMU2Slave(
@@ -184,7 +186,8 @@ class Slave:
     @property
     def notes(self) -> list[str]:
         """What the FMU warned of."""
-        return [f"{self.name}: {text}" for text in self._messages.warnings]
+        own = f"{self.name}: "  # some FMUs begin their messages with their name
+        return [own + text.removeprefix(own) for text in self._messages.warnings]
 
     def close(self) -> None:
         """Terminate and free the instance, as far as FMI allows after what happened."""
@@ -200,6 +203,19 @@ class Slave:
         self._lost = self._lost or error.status == fmi2Fatal
         self._may_terminate = self._may_terminate and error.status == fmi2Discard
         return SimulationError(f"{self.name}: {error.args[0].rstrip('.')} at {at}{_quoted(self._messages.latest)}")
+
+
+def _import_script(name: str, folder: Path) -> None:
+    """Import the script of a PythonFMU archive first: if that fails in its wrapper, the wrapper ends this process."""
+    pointer = folder / "resources" / "slavemodule.txt"
+    if not pointer.is_file():
+        return
+    sys.path.insert(0, str(pointer.parent))
+    try:
+        importlib.import_module(pointer.read_text(encoding="utf-8").strip())
+    except Exception as error:  # whatever the script does
+        forget_paths(folder)
+        raise SimulationError(f"{name}: its Python script fails to load: {type(error).__name__}: {error}") from error
 
 
 def forget_paths(folder: Path) -> None:
