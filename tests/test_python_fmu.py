@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import shutil
+import subprocess
 import sys
 from pathlib import Path
 
@@ -13,6 +14,7 @@ import pytest
 from fmpy.fmi1 import FMICallException
 
 from imufmu.fmi import runtime
+from imufmu.fmi.build import cached_fmu
 from imufmu.registry import BLOCKS, ESTIMATORS
 from imufmu.vocabulary import Status
 
@@ -160,6 +162,20 @@ def test_an_fmu_refuses_to_start_on_another_imufmu_in_memory(tmp_path):
         with pytest.raises(Exception, match="Failed to instantiate"):
             fmu.Fmu("lee2012", folder=str(folder))
     fmu.Fmu("lee2012").initialise().close()
+
+
+def test_a_script_may_simulate_again_and_again_with_fmpy(tmp_path):
+    """FMPy deletes what it unpacked, with it the imufmu that the first FMU brought into the process."""
+    program = """if True:
+        import fmpy, sys
+        for k in range(3):
+            result = fmpy.simulate_fmu(sys.argv[1], stop_time=0.1, start_values={"c_a": 0.1 * k})
+        assert not __import__("pathlib").Path(sys.modules["imufmu"].__file__).exists()
+        print(len(result))
+    """
+    command = [sys.executable, "-c", program, str(cached_fmu("lee2012"))]
+    done = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path)
+    assert done.stdout.strip() == "11", done.stderr
 
 
 def test_line_ends_do_not_make_another_version(tmp_path):

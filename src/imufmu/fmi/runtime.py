@@ -40,12 +40,16 @@ def fingerprint(package: Path) -> str:
     return digest.hexdigest()
 
 
+# Now, because a package that was loaded from an unpacked FMU is deleted together with it, and goes on serving others.
+_IN_MEMORY = fingerprint(PACKAGE)
+
+
 def refusal(resources: Path) -> str:
     """Why the package in memory cannot serve the FMU with these resources; empty if it can."""
     own = resources / "imufmu"
     if not own.is_dir():
         return f"{resources} holds no copy of imufmu: the FMU is incomplete, build it again"
-    if own.resolve() == PACKAGE.resolve() or fingerprint(own) == fingerprint(PACKAGE):
+    if fingerprint(own) == _IN_MEMORY:
         return ""
     return (
         f"this FMU was built from another version of imufmu than the one already in memory ({PACKAGE}). "
