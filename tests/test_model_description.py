@@ -111,7 +111,19 @@ def test_archive_holds_documentation_icon_sources_and_a_binary_of_its_name(name)
     assert BLOCKS[name].reference.split(",")[0] in page
 
 
+@pytest.mark.parametrize("name", NAMES)
+def test_capabilities_are_declared(name):
+    """States and several instances work (tests of the FMUs); interpolation and derivatives are not offered."""
+    declared = xml(name).find("CoSimulation").attrib
+    offered = ("canGetAndSetFMUstate", "canSerializeFMUstate", "canHandleVariableCommunicationStepSize")
+    assert all(declared[capability] == "true" for capability in offered)
+    refused = ("needsExecutionTool", "canBeInstantiatedOnlyOncePerProcess", "canInterpolateInputs")
+    assert all(declared[capability] == "false" for capability in refused)
+
+
 def test_the_same_source_gives_the_same_bytes(tmp_path):
+    with zipfile.ZipFile(cached_fmu("lee2012")) as archive:
+        assert {member.date_time for member in archive.infolist()} == {(1980, 1, 1, 0, 0, 0)}  # not that of the build
     first = build_fmu("lee2012", tmp_path / "one").read_bytes()
     assert build_fmu("lee2012", tmp_path / "two").read_bytes() == first
     assert sorted(path.name for path in (tmp_path / "one").iterdir()) == ["lee2012.fmu"]

@@ -152,6 +152,19 @@ def test_a_serialised_state_survives_the_instance_that_wrote_it(name):
     reader.close()
 
 
+def test_a_restored_state_remembers_that_it_warned():
+    instance = fmu.Fmu("lee2012").initialise()
+    instance.set({"gyro[1]": math.nan})
+    instance.step(0.0, 0.01)
+    saved = fmu.serialised(instance)
+    instance.set({"gyro[1]": 0.0})
+    instance.step(0.01, 0.01)
+    fmu.restore(instance, saved)
+    instance.step(0.01, 0.01)
+    assert [status for status, _ in instance.log] == [WARNING]
+    instance.close()
+
+
 def test_an_fmu_refuses_to_start_on_another_imufmu_in_memory(tmp_path):
     folder = shutil.copytree(fmu.unpacked("lee2012"), tmp_path / "edited")
     source = Path(folder) / "resources" / "imufmu" / "estimators" / "lee2012.py"

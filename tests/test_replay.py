@@ -95,6 +95,21 @@ def test_cells_without_a_number_are_missing_samples_with_flag_and_one_warning(tm
     assert sum("not finite" in note for note in result.notes) == 1
 
 
+def test_missing_samples_are_held_for_an_fmu_that_cannot_say_it_misses_them(tmp_path, rng):
+    plain = tmp_path / "plain.fmu"
+    with zipfile.ZipFile(cached_fmu("lee2012")) as source, zipfile.ZipFile(plain, "w") as target:
+        for member in source.namelist():
+            target.writestr(member, source.read(member).replace(b'name="status"', b'name="flags"'))
+    accel, gyro = rng.normal((0.0, 1.0, 9.7), 0.3, (400, 3)), rng.normal(0, 0.3, (400, 3))
+    accel[0] = accel[200:210, 1] = gyro[205:230, 2] = np.nan
+    recording = recordings.read(record(tmp_path / "r.csv", rng, accel=accel, gyro=gyro))
+    result = replay(recording, plain)
+    accel[0], accel[200:210, 1], gyro[205:230, 2] = 0.0, accel[199, 1], gyro[204, 2]
+    expected = run(lee2012.BLOCK, {"gyro": gyro, "accel": accel}, {"sample_period": PERIOD}, start_time=5.0)
+    assert np.array_equal(result.signals()["vertical"], expected["vertical"])
+    assert any("31 of 400 samples are incomplete; held" in note for note in result.notes)
+
+
 def test_the_sample_period_follows_the_recording_and_no_other_is_accepted(tmp_path, rng):
     recording = recordings.read(record(tmp_path / "r.csv", rng))
     with pytest.raises(WiringError, match=r"sample_period = 0.01 s, but .*r.csv has a sample every 0.0035 s"):

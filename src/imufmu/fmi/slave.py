@@ -23,15 +23,15 @@ from ..instance import SampledInstance, StepError, instantiate
 from ..signals import Parameter
 from .runtime import refusal
 
-_STARTING, _INITIALISING, _STEPPING, _FAILED = range(4)
+_STARTING, _INITIALISING, _STEPPING = range(3)
 
 
 def _hold(thing: Any) -> None:
     """Add a reference that is never given back.
 
-    PythonFMU 0.7.0 releases some objects once more than it acquired them: at every instantiation the namespace of the
-    FMU's script, after an exception the slave, its class and its log. Without a reference to spare they are freed, and
-    the next call crashes the host.
+    PythonFMU 0.7.0 releases some objects once more than it acquired them: the namespace of the FMU's script when it
+    looks up the class in it, after an exception the slave, its class and its log. Without a reference to spare they are
+    freed, and the next call crashes the host.
     """
     ctypes.pythonapi.Py_IncRef(ctypes.py_object(thing))
 
@@ -46,7 +46,6 @@ class BlockSlave(Fmi2Slave):
         _hold(vars(sys.modules[cls.__module__]))
 
     def __init__(self, **kwargs: Any) -> None:
-        _hold(vars(sys.modules[type(self).__module__]))
         super().__init__(**kwargs)
         reason = refusal(Path(kwargs["resources"]))
         if reason:
@@ -83,7 +82,6 @@ class BlockSlave(Fmi2Slave):
         try:
             self._instance.initialise(self._start_time)
         except ParameterError as error:
-            self._phase = _FAILED
             self.log(str(error), Fmi2Status.error)
             for thing in (self, type(self), self.log_queue):
                 _hold(thing)
@@ -118,7 +116,7 @@ class BlockSlave(Fmi2Slave):
         self._stale = False
         if self._phase == _STEPPING:
             self._instance.refresh()
-        elif self._phase != _FAILED and not self.block.parameter_problems(self._instance.p):
+        elif not self.block.parameter_problems(self._instance.p):
             self._instance.initialise(self._start_time)
 
     # Variables
