@@ -11,7 +11,7 @@ import struct
 import xml.parsers.expat
 import zipfile
 import zlib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path, PurePosixPath
 from typing import Any
@@ -67,20 +67,36 @@ def parse_xml(content: bytes, where: str) -> Any:
         raise ArchiveError(f"{where}, line {error.lineno}: {error.msg}") from error
 
 
+def read_members(path: Path, wanted: Callable[[str], bool]) -> tuple[set[str], dict[str, bytes]]:
+    """Names of all members of an archive, and the content of the wanted ones. Raises ArchiveError."""
+    with _opened(path) as archive:
+        names = set(archive.namelist())
+        return names, {name: _read(archive, name, path) for name in sorted(names) if wanted(name)}
+
+
+def fmu_members(path: Path) -> tuple[set[str], Any]:
+    """Names of the members of an FMU of any version and kind, and the root element (lxml) of its model description.
+
+    Raises ArchiveError.
+    """
+    name = "modelDescription.xml"
+    names, content = read_members(path, lambda member: member == name)
+    if name not in names:
+        raise ArchiveError(f"{path}: {name} is missing: this is no FMU")
+    root = parse_xml(content[name], f"{path}: {name}")
+    if root.tag != "fmiModelDescription" or root.get("fmiVersion") is None:
+        raise ArchiveError(f"{path}: {name}: no FMI model description: the root element is {root.tag}")
+    return names, root
+
+
 def read_fmu(path: Path) -> Any:
     """Checked ModelDescription (fmpy) of an FMU that this machine can run.
 
     Raises ArchiveError unless it is FMI 2.0 for co-simulation with a binary for this platform.
     """
     where = f"{path}: modelDescription.xml"
-    with _opened(path) as archive:
-        names = set(archive.namelist())
-        if "modelDescription.xml" not in names:
-            raise ArchiveError(f"{path}: modelDescription.xml is missing: this is no FMU")
-        root = parse_xml(_read(archive, "modelDescription.xml", path), where)
+    names, root = fmu_members(path)
     version = root.get("fmiVersion")
-    if root.tag != "fmiModelDescription" or version is None:
-        raise ArchiveError(f"{where}: no FMI model description: the root element is {root.tag}")
     if version != "2.0":
         raise ArchiveError(f"{path}: FMI {version}; expected FMI 2.0 for co-simulation. Export it as that")
     if root.find("CoSimulation") is None:

@@ -1,0 +1,173 @@
+"""Will this FMU run, and where? Plain answers from its archive, and from one step in a process of its own."""
+
+from __future__ import annotations
+
+import ast
+import importlib.util
+import sys
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from enum import Enum
+from pathlib import Path, PurePosixPath
+from typing import Any
+
+import fmpy
+from fmpy.validation import validate_fmu
+
+from ..archives import ArchiveError, fmu_members, read_members
+from .trial import try_step
+
+_SYSTEMS = {"linux": ".so", "win": ".dll", "darwin": ".dylib"}
+_PLATFORMS = {
+    "linux64": "64-bit Linux",
+    "win64": "64-bit Windows",
+    "darwin64": "macOS",
+    "linux32": "32-bit Linux",
+    "win32": "32-bit Windows",
+    "x86_64-linux": "64-bit Linux",
+    "x86_64-windows": "64-bit Windows",
+    "x86_64-darwin": "macOS on Intel",
+    "aarch64-linux": "Linux on ARM",
+    "aarch64-darwin": "macOS on Apple silicon",
+}
+_HOSTS = ("Simulink", "Dymola", "OpenModelica", "OMSimulator", "FMPy")
+
+
+class Level(Enum):
+    """What a finding means to its reader."""
+
+    GOOD = "ok"
+    NOTE = "note"
+    PROBLEM = "problem"
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One statement about an FMU."""
+
+    level: Level
+    topic: str
+    text: str
+
+
+def examine(path: Path) -> list[Finding]:
+    """Everything there is to say. The FMU is sound, and runs here, if no finding is a problem."""
+    try:
+        names, _ = fmu_members(path)
+        model = fmpy.read_model_description(str(path), validate=False)
+    except ArchiveError as error:
+        return [Finding(Level.PROBLEM, "archive", str(error))]
+    except Exception as error:  # fmpy's parsing raises many kinds
+        return [Finding(Level.PROBLEM, "model description", f"cannot be read: {error}")]
+    platforms = sorted({PurePosixPath(n).parts[1] for n in names if n.startswith("binaries/") and n.count("/") > 1})
+    is_python = "resources/slavemodule.txt" in names
+    findings = [*_standard(path, model), *_bounds(model), *_binaries(names, platforms, model)]
+    if is_python:
+        findings.append(_python_packages(path))
+    findings += _hosts(platforms, model, is_python)
+    findings.append(_trial(path, platforms, model))
+    return findings
+
+
+def _standard(path: Path, model: Any) -> Iterator[Finding]:
+    kinds = [
+        name for name, part in (("co-simulation", model.coSimulation), ("model exchange", model.modelExchange)) if part
+    ]
+    yield Finding(Level.GOOD, "kind", f"FMI {model.fmiVersion}, {' and '.join(kinds) or 'of no kind that FMPy knows'}")
+    problems = validate_fmu(str(path))
+    if not problems:
+        yield Finding(Level.GOOD, "validation", "FMPy finds nothing to complain about")
+    for problem in problems:
+        yield Finding(Level.PROBLEM, "validation", " ".join(problem.split()))
+
+
+def _bounds(model: Any) -> Iterator[Finding]:
+    """Bounds and start values, which no checker looks at."""
+    faults = []
+    for v in model.modelVariables:
+        declared = v.declaredType
+        low, high = (getattr(v, a) or (getattr(declared, a) if declared else None) for a in ("min", "max"))
+        try:
+            least, most = float(low or "-inf"), float(high or "inf")
+            start = None if v.start is None or v.type not in ("Real", "Integer") else float(v.start)
+        except ValueError as error:
+            faults.append(f"{v.name}: {error}")
+            continue
+        if least > most:
+            faults.append(f"{v.name}: min {least:g} exceeds max {most:g}")
+        elif start is not None and not least <= start <= most:
+            faults.append(f"{v.name}: start {start:g} is outside [{least:g}, {most:g}]")
+    if not faults:
+        yield Finding(Level.GOOD, "bounds", "every start value lies within its bounds")
+    for fault in faults:
+        yield Finding(Level.PROBLEM, "bounds", fault)
+
+
+def _binaries(names: Iterable[str], platforms: list[str], model: Any) -> Iterator[Finding]:
+    identifiers = {part.modelIdentifier for part in (model.coSimulation, model.modelExchange) if part}
+    if not platforms:
+        has_sources = any(name.startswith("sources/") for name in names)
+        remedy = "compile it from its sources with `fmpy compile`" if has_sources else "export it with binaries"
+        yield Finding(Level.PROBLEM, "binaries", f"there are none; {remedy}")
+    for platform in platforms:
+        suffix = next((s for system, s in _SYSTEMS.items() if system in platform), "")
+        missing = [i for i in identifiers if f"binaries/{platform}/{i}{suffix}" not in set(names)]
+        title = f"{platform} ({_PLATFORMS.get(platform, 'a platform without a name here')})"
+        if missing and suffix:
+            yield Finding(Level.PROBLEM, "binaries", f"{title}: {missing[0]}{suffix} is missing")
+        else:
+            yield Finding(Level.GOOD, "binaries", title)
+
+
+def _python_packages(path: Path) -> Finding:
+    """What the Python sources inside import from outside."""
+    pointer = "resources/slavemodule.txt"
+    names, sources = read_members(path, lambda n: n == pointer or (n.startswith("resources/") and n.endswith(".py")))
+    script = f"resources/{sources.pop(pointer).decode(errors='replace').strip()}.py"
+    if script not in names:
+        return Finding(Level.PROBLEM, "Python", f"{script} is missing, which {pointer} names")
+    inside = {PurePosixPath(name).parts[1].removesuffix(".py") for name in names if name.startswith("resources/")}
+    wanted = set()
+    for name, source in sources.items():
+        try:
+            tree = ast.parse(source)
+        except (SyntaxError, ValueError) as error:
+            return Finding(Level.PROBLEM, "Python", f"{name} is no valid Python: {error}")
+        for node in ast.walk(tree):
+            if isinstance(node, ast.Import):
+                wanted |= {alias.name.split(".")[0] for alias in node.names}
+            elif isinstance(node, ast.ImportFrom) and node.level == 0 and node.module:
+                wanted.add(node.module.split(".")[0])
+    outside = sorted(wanted - inside - set(sys.stdlib_module_names))
+    missing = [package for package in outside if importlib.util.find_spec(package) is None]
+    text = f"needs Python in the host process, with {', '.join(outside) or 'no further package'}"
+    if missing:
+        return Finding(Level.PROBLEM, "Python", f"{text}; not installed here: {', '.join(missing)}")
+    return Finding(Level.NOTE, "Python", f"{text} (all installed here)")
+
+
+def _hosts(platforms: list[str], model: Any, is_python: bool) -> Iterator[Finding]:
+    systems = sorted({_PLATFORMS.get(platform, platform) for platform in platforms})
+    where = ", ".join(systems) or "nowhere as it is"
+    for host in _HOSTS:
+        needs = []
+        if host in ("OpenModelica", "OMSimulator") and not str(model.fmiVersion).startswith("2."):
+            needs.append("an FMU of version 2.0")
+        if host == "OpenModelica" and model.modelExchange is None:
+            needs.append("OMSimulator, its part for co-simulation")
+        if is_python and host != "FMPy":
+            needs.append("the Python named above and its packages; on Linux started with LD_PRELOAD=libpython3.x.so")
+        text = f"{where}; needs {' and '.join(needs)}" if needs else where
+        yield Finding(Level.NOTE if needs else Level.GOOD, host, text)
+
+
+def _trial(path: Path, platforms: list[str], model: Any) -> Finding:
+    if model.coSimulation is None and model.modelExchange is None:
+        return Finding(Level.NOTE, "one step", "not tried: of no kind that FMPy runs")
+    if not {fmpy.platform, fmpy.platform_tuple} & set(platforms):
+        return Finding(Level.PROBLEM, "one step", f"not tried: no binary for this machine ({fmpy.platform})")
+    trial = try_step(path)
+    said = f" It said: {' | '.join(trial.said.splitlines()[-3:])}" if trial.said else ""
+    if trial.fault:
+        return Finding(Level.PROBLEM, "one step", f"{trial.fault}.{said}")
+    return Finding(Level.GOOD, "one step", f"works on this machine.{said}")
