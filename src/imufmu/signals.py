@@ -40,10 +40,15 @@ UNITS = {
         Unit("m", {"m": 1}),
         Unit("m/s", {"m": 1, "s": -1}),
         Unit("m/s2", {"m": 1, "s": -2}),
+        Unit("m/s3", {"m": 1, "s": -3}),
+        Unit("m2", {"m": 2}),
         Unit("m2/s4", {"m": 2, "s": -4}),
         Unit("rad", {"rad": 1}, display=("deg", DEGREES)),
         Unit("rad/s", {"rad": 1, "s": -1}, display=("deg/s", DEGREES)),
+        Unit("rad/s2", {"rad": 1, "s": -2}),
+        Unit("rad2", {"rad": 2}),
         Unit("rad2/s2", {"rad": 2, "s": -2}),
+        Unit("rad2/s5", {"rad": 2, "s": -5}),
         Unit("kg", {"kg": 1}),
         Unit("kg.m2", {"kg": 1, "m": 2}),
         Unit("N.m", {"kg": 1, "m": 2, "s": -2}),
@@ -51,6 +56,7 @@ UNITS = {
         Unit("J", {"kg": 1, "m": 2, "s": -2}),
         Unit("uT", {"kg": 1, "s": -2, "A": -1}, factor=1e-6),
         Unit("rad/s/sqrt(Hz)", None),
+        Unit("m/s/sqrt(Hz)", None),
         Unit("m/s2/sqrt(Hz)", None),
         Unit("uT/sqrt(Hz)", None),
     )
@@ -81,7 +87,7 @@ class Signal:
     def __post_init__(self) -> None:
         if self.unit not in UNITS:
             raise DeclarationError(f"{self.name}: unit {self.unit!r} is not in imufmu.signals.UNITS")
-        if not self.name.replace("_", "a").isalnum() or self.name[0].isdigit():
+        if not self.name.replace("_", "a").replace(".", "a").isalnum() or self.name[0].isdigit():
             raise DeclarationError(f"{self.name!r} is not a variable name")
         if not self.description:
             raise DeclarationError(f"{self.name}: description missing")

@@ -1,0 +1,107 @@
+"""Claims about blocks in series: the numbers are those of the blocks one after the other."""
+
+from __future__ import annotations
+
+import motions
+import numpy as np
+import pytest
+
+from imufmu.cosim import System, locate
+from imufmu.cosim import simulate as cosimulate
+from imufmu.estimators import lee2012
+from imufmu.plants import pendulum
+from imufmu.running import Stream, run
+from imufmu.sensors import imu
+from imufmu.series import series
+from imufmu.signals import DeclarationError
+
+ERRORS = {
+    "gyro_bias": (0.01, -0.02, 0.03),
+    "gyro_noise_density": 0.01,
+    "accel_noise_density": 0.02,
+    "accel_range": 30.0,
+}
+
+
+@pytest.fixture
+def ideal(rng) -> dict[str, np.ndarray]:
+    """What an ideal IMU on a tumbling, shaken sensor reads."""
+    motion = motions.motion(rng, 1500)
+    return {"angular_velocity": motion.gyro, "specific_force": motion.accel, "magnetic_field": motion.mag}
+
+
+def of(block: str, parameters: dict) -> dict:
+    return {f"{block}.{name}": value for name, value in parameters.items()}
+
+
+def test_a_smart_sensor_equals_imu_and_estimator_one_after_the_other_bit_for_bit(ideal):
+    smart = series(imu.BLOCK, lee2012.BLOCK)
+    together = run(smart, ideal, {"seed": 7, **of("imu", ERRORS), "lee2012.c_a": 0.3})
+    readings = run(imu.BLOCK, ideal, {"seed": 7, **ERRORS})
+    alone = run(lee2012.BLOCK, {"gyro": readings["gyro"], "accel": readings["accel"]}, {"c_a": 0.3})
+    for signal in lee2012.BLOCK.outputs:
+        assert np.array_equal(together[signal.name], alone[signal.name]), signal.name
+    assert np.array_equal(together["imu.gyro"], readings["gyro"])
+    assert np.array_equal(together["lee2012.P"], alone["P"])
+
+
+def test_missing_truth_is_held_by_the_sensor_and_the_estimator_never_sees_it(ideal):
+    ideal["angular_velocity"][100:110, 1] = np.nan
+    together = run(series(imu.BLOCK, lee2012.BLOCK), ideal)
+    assert all(np.isfinite(values).all() for values in together.values.values())
+    assert not together["status"].any()
+
+
+@pytest.mark.parametrize("plant", [pendulum.PENDULUM, pendulum.DOUBLE_PENDULUM], ids=lambda plant: plant.name)
+def test_a_whole_chain_equals_its_cosimulation(plant):
+    """A free swing of 4 s with noise. 1e-12 of each signal's size: time is added up in another order."""
+    period, rows = 0.01, 401
+    own = {
+        "plant": {"motion": 0, "initial_rate": np.ones(plant.inputs[0].size)},
+        "imu": {**ERRORS, "sample_period": period, "seed": 3},
+        "lee2012": {"sample_period": period, "c_a": 0.3},
+    }
+    system = System.read(locate(f"{plant.name}_lee2012"))
+    given = {f"{component}.{n}": value for component, values in own.items() for n, value in values.items()}
+    separate = cosimulate(system, stop_time=(rows - 1) * period, step=period, parameters=given)
+
+    chain = series(plant, imu.BLOCK, lee2012.BLOCK)
+    names = {"plant": plant.name, "imu": "imu", "lee2012": "lee2012"}
+    bound = {f"{names[s.component]}.{s.variable.name}": s.value for s in system.settings_with(given)}
+    shared = {"imu.seed": "seed", "imu.sample_period": "sample_period", "lee2012.sample_period": "sample_period"}
+    parameters = {shared.get(name, name): value for name, value in bound.items()}
+    together = run(chain, {"torque": np.zeros((rows, plant.inputs[0].size))}, parameters)
+    for signal in lee2012.BLOCK.outputs:
+        expected = separate[f"lee2012.{signal.name}"][:-1]  # the last row is held
+        scale = max(1.0, np.abs(expected).max())
+        assert np.abs(together[signal.name][:-1] - expected).max() < 1e-12 * scale, signal.name
+
+
+def test_a_stream_of_the_chain_equals_the_run(ideal):
+    smart = series(imu.BLOCK, lee2012.BLOCK)
+    expected = run(smart, ideal, of("imu", ERRORS))["vertical"]
+    stream = Stream(smart, of("imu", ERRORS))
+    for k in range(50):
+        out = stream.update(**{name: values[k] for name, values in ideal.items()})
+    assert np.array_equal(out["vertical"], expected[49])
+
+
+def test_the_sample_period_of_a_plant_chain_cannot_outgrow_the_solver():
+    chain = series(pendulum.PENDULUM, imu.BLOCK, lee2012.BLOCK)
+    (period,) = (p for p in chain.parameters if p.name == "sample_period")
+    assert period.maximum == pytest.approx(10 * pendulum.PENDULUM.longest_step)
+
+
+@pytest.mark.parametrize(
+    ("blocks", "fault"),
+    [
+        ((lee2012.BLOCK,), "at least two"),
+        ((lee2012.BLOCK, imu.BLOCK), "nothing before imu has an output angular_velocity"),
+        ((imu.BLOCK, pendulum.PENDULUM), "a plant can only stand first"),
+        ((pendulum.PENDULUM, lee2012.BLOCK), "nothing before lee2012 has an output gyro"),
+        ((imu.BLOCK, imu.BLOCK), "stands in it twice"),
+    ],
+)
+def test_blocks_that_do_not_fit_are_refused(blocks, fault):
+    with pytest.raises(DeclarationError, match=fault):
+        series(*blocks)
