@@ -22,12 +22,13 @@ class PythonFmu:
     """Blocks as FMUs, stepped sample by sample, plants by ``plant_step`` (s)."""
 
     name = "python_fmu"
+    kind = "python"
 
     def __init__(self, plant_step: float) -> None:
         self._plant_step = plant_step
 
-    def open(self, block: Block, parameters: Mapping[str, Any]) -> PythonFmuSession:
-        return PythonFmuSession(block, parameters)
+    def open(self, block: Block, parameters: Mapping[str, Any]) -> FmuSession:
+        return FmuSession(block, parameters, self.kind)
 
     def run(
         self, block: Block, inputs: Mapping[str, np.ndarray], parameters: Mapping[str, Any], rows: int
@@ -51,15 +52,15 @@ class PythonFmu:
         return Trajectory(np.arange(rows) * h, values)
 
 
-class PythonFmuSession:
+class FmuSession:
     """One instance of the FMU."""
 
-    def __init__(self, block: Block, parameters: Mapping[str, Any]) -> None:
+    def __init__(self, block: Block, parameters: Mapping[str, Any], kind: str) -> None:
         self._block = block
         p = block.parameter_vector(parameters)
         names = [v.name for v in block.variables if v.group == "parameter"]
         self.sample_period = dict(zip(names, p, strict=True)).get("sample_period", 0.0)
-        self._fmu = fmu.Fmu(block.name).initialise(dict(zip(names, p.tolist(), strict=True)))
+        self._fmu = fmu.Fmu(block.name, kind=kind).initialise(dict(zip(names, p.tolist(), strict=True)))
 
     def set(self, inputs: Mapping[str, np.ndarray]) -> None:
         for signal in self._block.inputs:

@@ -10,6 +10,7 @@ from collections.abc import Mapping
 from typing import Any, Protocol
 
 import numpy as np
+from backend_native_fmu import NativeFmu
 from backend_python_fmu import PythonFmu, Refused
 
 from imufmu.block import Block, ContinuousBlock, SampledBlock
@@ -93,4 +94,4 @@ class InProcessSession:
         self._instance.set_state(json.loads(saved))
 
 
-BACKENDS: tuple[Backend, ...] = (InProcess(), PythonFmu(PLANT_STEP))
+BACKENDS: tuple[Backend, ...] = (InProcess(), PythonFmu(PLANT_STEP), NativeFmu(PLANT_STEP))

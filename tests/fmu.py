@@ -4,36 +4,55 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from functools import lru_cache
+from pathlib import Path
 from typing import Any
 
 import fmpy
 from fmpy import fmi2
 
+from imufmu.cosim.slave import forget_paths
 from imufmu.fmi.build import cached_fmu
+from imufmu.fmi.native import cached_native_fmu
+
+KINDS = ("python", "native")
+
+
+def path(name: str, kind: str = "python") -> Path:
+    """The FMU of a registered block, of one of KINDS, for this platform."""
+    return cached_native_fmu(name) if kind == "native" else cached_fmu(name)
 
 
 @lru_cache
-def description(name: str) -> Any:
+def description(name: str, kind: str = "python") -> Any:
     """ModelDescription (fmpy) of the FMU of a registered block."""
-    return fmpy.read_model_description(str(cached_fmu(name)))
+    return fmpy.read_model_description(str(path(name, kind)))
 
 
 @lru_cache
-def unpacked(name: str) -> str:
+def unpacked(name: str, kind: str = "python") -> str:
     """Folder of the unpacked FMU, for the whole test run."""
-    return str(fmpy.extract(str(cached_fmu(name))))
+    return str(fmpy.extract(str(path(name, kind))))
 
 
 class Fmu:
     """One instance; ``log`` collects (status, message)."""
 
-    def __init__(self, name: str, instance_name: str = "instance", folder: str = "") -> None:
-        self.model = description(name)
+    def __init__(
+        self,
+        name: str,
+        instance_name: str = "instance",
+        folder: str = "",
+        *,
+        kind: str = "python",
+        guid: str = "",
+        logging: bool = True,
+    ) -> None:
+        self.model = description(name, kind)
         self.variables = {v.name: v for v in self.model.modelVariables}
         self.log: list[tuple[int, str]] = []
         self.slave = fmi2.FMU2Slave(
-            guid=self.model.guid,
-            unzipDirectory=folder or unpacked(name),
+            guid=guid or self.model.guid,
+            unzipDirectory=folder or unpacked(name, kind),
             modelIdentifier=self.model.coSimulation.modelIdentifier,
             instanceName=instance_name,
         )
@@ -42,7 +61,10 @@ class Fmu:
         callbacks.allocateMemory = fmi2.fmi2CallbackAllocateMemoryTYPE(fmi2.calloc)
         callbacks.freeMemory = fmi2.fmi2CallbackFreeMemoryTYPE(fmi2.free)
         self.callbacks = callbacks
-        self.slave.instantiate(callbacks=callbacks, loggingOn=True)
+        try:
+            self.slave.instantiate(callbacks=callbacks, loggingOn=logging)
+        finally:
+            forget_paths(Path(folder or unpacked(name, kind)))  # a process started later would import from there
 
     def _logged(self, _environment: Any, _name: bytes, status: int, _category: bytes, message: bytes) -> None:
         self.log.append((status, message.decode()))

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import replace
 from typing import Any
 
+import casadi as ca
 import numpy as np
 import pytest
-from toys import GAIN, MIRROR, OSCILLATOR, signal
+from toys import GAIN, LAZY, MIRROR, OSCILLATOR, signal
 
 from imufmu.block import ParameterError
 from imufmu.running import run, simulate
@@ -84,6 +86,47 @@ def test_a_result_of_another_shape_is_refused_by_name(value: Any, shape: str) ->
     wrong = replace(MIRROR, initial=lambda u, p: dict(samples=1, sum=0, product=value))
     with pytest.raises(DeclarationError, match=rf"mirror\.initial: product has shape {shape}, not \(2, 3\)"):
         run(wrong, {"scalar": [1.0]})
+
+
+def test_a_slow_step_or_a_step_beside_it_that_returns_other_names_is_refused() -> None:
+    with pytest.raises(DeclarationError, match=r"lazy\.slow_step must return \[.*\], returned \[.*'extra'.*\]"):
+        run(replace(LAZY, slow_step=lambda *_: dict(extra=1)), {"scalar": [1.0, 2.0]})
+    # The step changes the states declared first: sum without samples is not a beginning.
+    with pytest.raises(DeclarationError, match=r"lazy\.step must return \['samples'\], returned \['sum'\]"):
+        run(replace(LAZY, step=lambda *_: dict(sum=1)), {"scalar": [1.0, 2.0]})
+
+
+@pytest.mark.parametrize("missing", ["slow_due", "slow_step"])
+def test_half_a_slow_step_is_refused(missing: str) -> None:
+    half: dict[str, Any] = {missing: None}
+    with pytest.raises(DeclarationError, match="lazy: declare both of slow_due and slow_step, or neither"):
+        replace(LAZY, **half)
+
+
+def test_a_slow_step_stands_behind_a_switch_that_skips_it() -> None:
+    """CasADi evaluates only the chosen branch of a Switch; generated C has an if there."""
+    graph = LAZY.next_function
+    assert "lazy_slow_step" not in graph.get_function()
+    assert graph.get_function("lazy_switch").class_name() == "Switch"
+    code = ca.CodeGenerator("lazy", {"with_header": False})
+    code.add(graph)
+    text = str(code.dump())
+    name = re.search(r"/\* lazy_slow_step:.*\*/\s*static int (\w+)", text)
+    assert name is not None
+    assert re.findall(r"(.*)\n.*" + name[1] + r"\(arg\+1", text) == ["  if (arg[0] ? casadi_to_int(*arg[0]) : 0) {"]
+
+
+def test_a_block_without_a_slow_step_is_one_list_of_instructions() -> None:
+    assert MIRROR.next_function.is_a("SXFunction")
+
+
+@pytest.mark.parametrize("changed", ["samples", "sum", "product"])
+def test_the_step_beside_a_slow_step_may_change_any_beginning_of_the_state(changed: str) -> None:
+    names = ["samples", "sum", "product"]
+    first = names[: names.index(changed) + 1]
+    block = replace(LAZY, step=lambda x, u, p: {name: 1 + getattr(x, name) for name in first}, slow_due=lambda *_: 0)
+    seen = run(block, {"scalar": np.zeros(4)})
+    assert [name for name in names if np.all(seen[name][3] - seen[name][0] == 3)] == first
 
 
 # Flat vectors

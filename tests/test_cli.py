@@ -77,6 +77,22 @@ def test_build_and_info(imufmu, tmp_path):
     assert "linux64, win64" in text and re.search(r"^c_a .*parameter +tunable +1 +0.1 +0.0 +1.0", text, re.MULTILINE)
 
 
+def test_native_fmus_and_series_are_built_and_found_healthy(imufmu, tmp_path):
+    assert imufmu("build", "lee2012", "imu+lee2012", "--native")[0] == 0
+    assert {path.name for path in tmp_path.iterdir()} == {"lee2012.fmu", "imu_lee2012.fmu"}
+    code, text, _ = imufmu("doctor", tmp_path / "imu_lee2012.fmu")
+    assert code == 0
+    assert re.search(r"^ok +one step +works on this machine", text, re.MULTILINE)
+    assert not re.search(r"^\w+ +Python ", text, re.MULTILINE)
+
+
+def test_what_the_doctor_finds_wrong_is_exit_code_1(imufmu, tmp_path):
+    (tmp_path / "broken.fmu").write_bytes(b"PK\x03\x04 cut off")
+    code, text, _ = imufmu("doctor", "broken.fmu")
+    assert code == 1
+    assert re.search(r"^problem +archive +.*broken.fmu", text, re.MULTILINE)
+
+
 def test_run_compares_writes_and_says_where(imufmu, tmp_path):
     arguments = ("run", "pendulum_lee2012", "--stop", 4, "--plot", "--report", "r.html", "--output", "r.csv")
     code, text, errors = imufmu(*arguments)
@@ -108,6 +124,9 @@ def test_demo_makes_a_figure_and_a_page(imufmu, tmp_path):
 WRONG = {
     "unknown command": (["walk"], "walk"),
     "unknown block": (["build", "lee2013"], "no block is called 'lee2013'"),
+    "blocks that do not fit": (["build", "imu+pendulum", "--native"], "a plant can only stand first"),
+    "platform without native": (["build", "lee2012", "--platform", "win64"], "together with --native"),
+    "unknown platform": (["build", "lee2012", "--native", "--platform", "amiga"], "no platform is called 'amiga'"),
     "unknown system": (["run", "pendulum"], "no system is called 'pendulum'"),
     "unknown parameter": (["run", "pendulum_lee2012", "--set", "lee2012.c_b=1"], "Near: c_a"),
     "unknown component": (["run", "pendulum_lee2012", "--set", "lee.c_a=1"], "no component 'lee'"),

@@ -8,7 +8,7 @@ from typing import Any
 import motions
 import numpy as np
 import pytest
-from toys import GAIN, MIRROR, OSCILLATOR, oscillator_position
+from toys import GAIN, LAZY, MIRROR, OSCILLATOR, eager, oscillator_position
 
 from imufmu.block import Block, ParameterError, SampledBlock
 from imufmu.estimators import lee2012
@@ -36,7 +36,7 @@ def flat(block: Block, result: Trajectory) -> np.ndarray:
 
 
 @pytest.mark.parametrize("n", AROUND_A_CHUNK)
-@pytest.mark.parametrize("block", [MIRROR, lee2012.BLOCK], ids=lambda b: b.name)
+@pytest.mark.parametrize("block", [MIRROR, LAZY, lee2012.BLOCK], ids=lambda b: b.name)
 def test_a_record_a_stream_and_an_instance_agree_bit_for_bit(block: SampledBlock, n: int) -> None:
     inputs, parameters = record(block, n), {"sample_period": 0.02} | ({"seed": 5} if block.normals else {})
     whole = run(block, inputs, parameters, start_time=3.0)
@@ -54,6 +54,15 @@ def test_a_record_a_stream_and_an_instance_agree_bit_for_bit(block: SampledBlock
         stepped.append(instance.y.copy())
     assert np.array_equal(flat(block, whole), streamed)
     assert np.array_equal(flat(block, whole), stepped)
+
+
+def test_a_slow_step_that_is_skipped_equals_one_that_is_never_due() -> None:
+    inputs = record(LAZY, 100)
+    lazy = run(LAZY, inputs)
+    assert np.array_equal(flat(LAZY, lazy), flat(LAZY, run(eager(LAZY), inputs)))
+    # The first sample counts but is not stepped to: the slow step is due at rows 2, 5, 8, ...
+    assert np.array_equal(np.flatnonzero(np.diff(lazy["product"][:, 0, 0])) + 1, np.arange(2, 100, 3))
+    assert np.array_equal(lazy["sum"] == 0, np.arange(100) % 3 == 2)
 
 
 def test_results_have_the_declared_shapes_and_instants() -> None:

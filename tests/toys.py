@@ -1,6 +1,11 @@
-"""Two small blocks that make the framework visible: one reports all it sees, one has a closed-form solution."""
+"""Small blocks that make the framework visible: one reports all it sees, one the same with a slow step, one has a
+closed-form solution."""
 
 from __future__ import annotations
+
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -59,6 +64,30 @@ MIRROR = SampledBlock(
     period=0.01,
     normals=2,
 )
+
+# Every third sample it empties the sum and adds the last input and draw to the product.
+LAZY = replace(
+    MIRROR,
+    name="lazy",
+    step=lambda x, u, p: dict(samples=x.samples + 1, sum=x.sum + u.scalar),
+    slow_due=lambda x, u, p: ca.fmod(x.samples, 3) == 0,
+    slow_step=lambda x, u, p: dict(product=x.product + 0.1 * x.sum * u.matrix_previous + u.normal[1], sum=0),
+)
+
+
+def eager(block: SampledBlock) -> SampledBlock:
+    """The same block with its slow step evaluated at every sample, and its result selected where it is due."""
+    due, slow_step = block.slow_due, block.slow_step
+    assert due is not None and slow_step is not None
+
+    def step(x: SimpleNamespace, u: SimpleNamespace, p: SimpleNamespace) -> dict[str, Any]:
+        now = SimpleNamespace(**(vars(x) | block.step(x, u, p)))
+        slowed = slow_step(now, u, p)
+        is_due = due(now, u, p)
+        return {name: ca.if_else(is_due, slowed.get(name, value), value) for name, value in vars(now).items()}
+
+    return replace(block, step=step, slow_due=None, slow_step=None)
+
 
 # q'' = -w^2 q + force + cos(t), q(0) = 1, q'(0) = 0
 OSCILLATOR = ContinuousBlock(

@@ -6,6 +6,13 @@ Two kinds. A **sampled** block (IMU, estimator) advances at multiples of its par
     step(x, u, p) -> state        every further sample
     output(x, u, p) -> outputs and locals, after either
 
+A costly part of the step that is rarely due (a covariance update, say) may stand apart, declared by both of
+
+    slow_due(x, u, p) -> condition    asked after every ``step``, with its result
+    slow_step(x, u, p) -> state       where the condition is not 0; really skipped where it is, in C too
+
+``slow_step`` returns the states that it changes; ``step`` then returns as many as it changes, the first ones declared.
+
 A **continuous** block (plant) is integrated by RK4 with steps no longer than its parameter ``max_step``:
 
     initial(p) -> state
@@ -203,6 +210,12 @@ class SampledBlock(Block):
     step: Callable[..., Expressions]
     period: float = 0.01
     normals: int = 0  # standard normal draws per sample
+    slow_due: Callable[..., Any] | None = None
+    slow_step: Callable[..., Expressions] | None = None
+
+    def __post_init__(self) -> None:
+        if (self.slow_due is None) != (self.slow_step is None):
+            raise DeclarationError(f"{self.name}: declare both of slow_due and slow_step, or neither")
 
     def _framework_parameters(self) -> tuple[Parameter, ...]:
         period = vocabulary.sample_period(self.period)
@@ -220,7 +233,12 @@ class SampledBlock(Block):
 
     @cached_property
     def next_function(self) -> Any:
-        """CasADi Function (x, u, p, w) -> (x, y): every further sample."""
+        """CasADi Function (x, u, p, w) -> (x, y): every further sample.
+
+        One list of instructions (SX); with a slow step a graph (MX) of such lists, one of them behind a switch.
+        """
+        if self.slow_due is not None and self.slow_step is not None:
+            return self._next_with_slow_step(self.slow_due, self.slow_step)
         u, p, w = self._arguments()
         x_all = self._symbols("x", self.held_state)
         n = total_size(self.state)
@@ -229,6 +247,39 @@ class SampledBlock(Block):
         x = self._flatten("step", self.state, self.step(state, inputs, _namespace(self.parameters, p)))
         y = self._outputs(x, inputs, p)
         result = [ca.vertcat(x, *finite), y]
+        return ca.Function(f"{self.name}_next", [x_all, u, p, w], result, ["x", "u", "p", "w"], ["x_next", "y"])
+
+    def _next_with_slow_step(self, slow_due: Callable[..., Any], slow_step: Callable[..., Expressions]) -> Any:
+        """``next_function`` of a block with a slow step.
+
+        The state is cut in two, so that what only the slow step changes is not copied from part to part.
+        """
+        x, held = self._symbols("x", self.state), self._symbols("held", self.inputs)
+        u, p, w = self._arguments()
+        inputs, finite = self._inputs(u, held, w)
+        seen = _namespace(self.state, x), inputs, _namespace(self.parameters, p)
+        stepped = self.step(*seen)
+        fast_states = self.state[: len(stepped)]
+        n = total_size(fast_states)
+
+        def part(name: str, *results: Any) -> Any:
+            return ca.Function(f"{self.name}_{name}", [x[:n], x[n:], held, u, p, w], results)
+
+        slowed = self._flatten("slow_step", self.state, vars(seen[0]) | dict(slow_step(*seen)))
+        step = part("step", self._flatten("step", fast_states, stepped), ca.vertcat(*finite))
+        due = part("slow_due", ca.SX(slow_due(*seen)) != 0)
+        slow = part("slow_step", slowed[:n], slowed[n:])
+        output = part("output_after", self._outputs(x, inputs, p))
+
+        symbols = slow.mx_in()
+        keep = ca.Function(f"{self.name}_keep", symbols, symbols[:2])
+        switch = ca.Function.if_else(f"{self.name}_switch", slow, keep)
+        x_all, (u, p, w) = ca.MX.sym("x", x.numel() + held.numel()), symbols[3:]
+        fast, slow, held = ca.vertsplit(x_all, [0, n, x.numel(), x_all.numel()])
+        fast, finite = step(fast, slow, held, u, p, w)
+        now = fast, slow, held, u, p, w
+        fast, slow = switch(due(*now), *now)
+        result = [ca.vertcat(fast, slow, finite), output(fast, slow, held, u, p, w)]
         return ca.Function(f"{self.name}_next", [x_all, u, p, w], result, ["x", "u", "p", "w"], ["x_next", "y"])
 
     @cached_property

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
-from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
 from . import __version__
+from .arguments import check_target, parsed_sets
+from .console import err, notes, out, print_table, progress_bar, written
 from .evaluate.report import Table
 
 EXAMPLES = """IMU attitude estimators as drop-in FMUs, with the plants and IMU models to test them.
@@ -21,19 +19,22 @@ EXAMPLES = """IMU attitude estimators as drop-in FMUs, with the plants and IMU m
   imufmu demo                                   pendulum, IMU and lee2012: table, figure, report
   imufmu list                                   blocks, systems, devices
   imufmu build lee2012                          writes lee2012.fmu
+  imufmu build lee2012 --native                 the same without Python inside
   imufmu info lee2012.fmu                       what is inside
+  imufmu doctor lee2012.fmu                     whether and where it runs
   imufmu run pendulum_lee2012 --set lee2012.mode=3 --plot
   imufmu replay walk.csv --estimator lee2012 --set c_a=0.2 --output tilt.csv
   imufmu pack pendulum_lee2012 pendulum.ssp     for other tools
+  imufmu validate --junit verdict.xml           do the papers' conclusions hold?
+  imufmu benchmark broad                        every filter on a folder of recordings
+  imufmu predict --imu mtx --slosh 1            how well this gyroscope can know the vertical
 
-Exit codes: 0 success, 1 a finding (a simulation failed), 2 wrong usage or input.
+Exit codes: 0 success, 1 a finding (a criterion not met, a simulation failed), 2 wrong usage or input.
 """
 
 app = typer.Typer(
     help=EXAMPLES, no_args_is_help=True, add_completion=False, rich_markup_mode=None, pretty_exceptions_enable=False
 )
-out = Console(highlight=False, soft_wrap=True)
-err = Console(stderr=True, highlight=False, soft_wrap=True)
 
 Sets = Annotated[
     list[str] | None,
@@ -79,18 +80,52 @@ def _description(path: Path) -> str:
 def build(
     names: Annotated[list[str], typer.Argument(help="Names of blocks (see: imufmu list), or: all")],
     folder: Annotated[Path, typer.Option("--folder", "-f", help="Where the FMUs go.")] = Path(),
+    native: Annotated[bool, typer.Option("--native", help="Compiled C, which needs no Python where it runs.")] = False,
+    platforms: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--platform", "-p", help="With --native: a platform inside, or: all. Repeatable. Default: this one."
+        ),
+    ] = None,
 ) -> None:
-    """Write FMUs.
+    """Write FMUs, in Python or as native code.
 
     \b
       imufmu build lee2012
       imufmu build all --folder fmus
+      imufmu build lee2012 --native
+      imufmu build lee2012 --native --platform all        needs: pip install "imufmu[native]"
+      imufmu build imu+lee2012 --native                   both in series, as one FMU
     """
     from .fmi.build import build_fmu
+    from .fmi.compilers import PLATFORMS
+    from .fmi.native import build_native
     from .registry import BLOCKS
 
+    if platforms and not native:
+        raise typer.BadParameter("give it together with --native", param_hint="--platform")
     for name in BLOCKS if names == ["all"] else names:
-        out.print(str(build_fmu(name, folder)))
+        if native:
+            with progress_bar(f"compiling {name}") as progress:
+                path = build_native(name, folder, [*PLATFORMS] if platforms == ["all"] else platforms, progress)
+        else:
+            path = build_fmu(name, folder)
+        out.print(str(path))
+
+
+@app.command()
+def doctor(fmu: Annotated[Path, typer.Argument(help="An .fmu file")]) -> None:
+    """Say whether and where an FMU will run, and try one step of it. Exit code 1 if something is wrong.
+
+    \b
+      imufmu doctor lee2012.fmu
+    """
+    from .fmi.doctor import Level, examine
+
+    findings = examine(fmu)
+    print_table(Table(["", "what", "finding"], [[f.level.value, f.topic, f.text] for f in findings], words=True))
+    if any(finding.level is Level.PROBLEM for finding in findings):
+        raise typer.Exit(1)
 
 
 @app.command()
@@ -106,7 +141,7 @@ def info(fmu: Annotated[str, typer.Argument(help="Name of a block, or an .fmu fi
     heading, rows = describe(fmu)
     for line in heading:
         out.print(line, markup=False)
-    _print_table(Table(COLUMNS, rows, words=True))
+    print_table(Table(COLUMNS, rows, words=True))
 
 
 @app.command()
@@ -132,17 +167,19 @@ def run(
     from .cosim import System, locate, simulate
     from .evaluate.present import present_run
 
-    _check_suffix(output, ".csv", ".h5")
-    _check_suffix(report, ".html")
+    check_target(output, ".csv", ".h5")
+    check_target(report, ".html")
     read = System.read(locate(system))
-    with _progress(f"running {read.description.name}") as progress:
-        result = simulate(read, stop_time=stop, step=step, parameters=_parsed(sets), jacobi=jacobi, progress=progress)
+    with progress_bar(f"running {read.description.name}") as progress:
+        result = simulate(
+            read, stop_time=stop, step=step, parameters=parsed_sets(sets), jacobi=jacobi, progress=progress
+        )
     figure = Path(f"{read.description.name}.png") if plot else None
-    _notes(result.notes)
-    _print_table(present_run(result, figure, report))
+    notes(result.notes)
+    print_table(present_run(result, figure, report))
     if output:
         (result.to_csv if output.suffix.lower() == ".csv" else result.to_hdf5)(output)
-    _written(output, figure, report)
+    written(output, figure, report)
 
 
 @app.command()
@@ -171,22 +208,22 @@ def replay(
     from .evaluate.present import present_replay
     from .recordings import read
 
-    _check_suffix(output, ".csv")
+    check_target(output, ".csv")
     read_recording = read(recording)
-    with _progress(f"replaying {read_recording.name}") as progress:
+    with progress_bar(f"replaying {read_recording.name}") as progress:
         result = replay_recording(
             read_recording,
             estimator_fmu(estimator),
-            _parsed(sets),
+            parsed_sets(sets),
             local_variables=local_variables,
             progress=progress,
         )
     figure = Path(f"{read_recording.name}_{result.estimator}.png") if plot else None
-    _notes(result.notes)
-    _print_table(present_replay(result, figure))
+    notes(result.notes)
+    print_table(present_replay(result, figure))
     if output:
         result.to_csv(output)
-    _written(output, figure)
+    written(output, figure)
 
 
 @app.command()
@@ -202,7 +239,7 @@ def pack(
     from .cosim import locate
     from .cosim import pack as pack_system
 
-    _check_suffix(target, ".ssp")
+    check_target(target, ".ssp")
     pack_system(locate(system), target)
     out.print(str(target))
 
@@ -218,68 +255,117 @@ def demo(
     """
     from .evaluate.demo import run_demo
 
-    with _progress("co-simulating the demo") as progress:
+    with progress_bar("co-simulating the demo") as progress:
         made = run_demo(folder, progress)
-    _print_table(made.table)
-    _written(made.figure, made.report)
+    print_table(made.table)
+    written(made.figure, made.report)
 
 
-def _parsed(sets: list[str] | None) -> dict[str, Any]:
-    """NAME=VALUE as a dict with numbers, truth values and vectors."""
-    values: dict[str, Any] = {}
-    for text in sets or []:
-        name, equals, value = text.partition("=")
-        if not (name.strip() and equals and value.strip()):
-            raise typer.BadParameter(f"{text!r}: expected NAME=VALUE, such as c_a=0.2", param_hint="--set")
-        parts = [_number(part.strip(), text) for part in value.split(",")]
-        values[name.strip()] = parts[0] if len(parts) == 1 else parts
-    return values
+@app.command()
+def validate(
+    papers: Annotated[list[str] | None, typer.Argument(help="Papers, by the names of their estimators; or all")] = None,
+    quick: Annotated[
+        bool, typer.Option("--quick", help="Fewer random motions: two minutes instead of ten.")
+    ] = False,
+    report: Annotated[Path | None, typer.Option("--report", help="Write an HTML report to this file.")] = None,
+    junit: Annotated[
+        Path | None, typer.Option("--junit", help="Write the checks to this .xml file, for a CI server.")
+    ] = None,
+    json: Annotated[
+        Path | None, typer.Option("--json", help="Write everything but figures to this .json file.")
+    ] = None,
+) -> None:
+    """Do the papers' experiments again and check their conclusions; exit code 1 if a criterion is not met.
+
+    \b
+      imufmu validate
+      imufmu validate lee2012 rizun2008 --quick
+      imufmu validate --report verdict.html --junit verdict.xml --json verdict.json
+    """
+    from .evaluate.junit import write_junit
+    from .evaluate.validate import validate as run_experiments
+    from .evaluate.verdicts import failure_table, verdict_table, write_json, write_page
+
+    check_target(report, ".html")
+    check_target(junit, ".xml")
+    check_target(json, ".json")
+    with progress_bar("the papers' experiments") as progress:
+        verdicts = run_experiments(papers or (), quick=quick, drawn=report is not None, progress=progress)
+    print_table(verdict_table(verdicts))
+    for verdict in verdicts:
+        for remark in verdict.remarks:
+            out.print(f"remark on {verdict.name}: {remark}", markup=False)
+    failures = failure_table(verdicts)
+    if failures:
+        print_table(failures)
+    if report:
+        write_page(report, verdicts, quick)
+    if junit:
+        write_junit(junit, verdicts)
+    if json:
+        write_json(json, verdicts, quick)
+    written(report, junit, json)
+    if failures:
+        raise typer.Exit(1)
 
 
-def _number(text: str, whole: str) -> Any:
-    if text.lower() in ("true", "false"):
-        return text.lower() == "true"
-    for kind in (int, float):
-        try:
-            return kind(text)
-        except ValueError:
-            continue
-    raise typer.BadParameter(f"{whole!r}: {text!r} is not a number", param_hint="--set")
+@app.command()
+def benchmark(
+    folder: Annotated[Path, typer.Argument(help="Folder with recordings that know the truth: .csv, or .mat of BROAD")],
+    estimators: Annotated[
+        list[str] | None, typer.Option("--estimator", "-e", help="Name of an estimator; all without. Repeatable.")
+    ] = None,
+    delay: Annotated[
+        float, typer.Option(min=-1.0, max=1.0, help="Score once more with the truth delayed by this (s).")
+    ] = 0.0023,
+    rest_bias: Annotated[
+        float, typer.Option(min=0.0, help="Rest at the start (s) whose mean gyro the second contest removes; 0: none.")
+    ] = 3.0,
+    csv: Annotated[Path | None, typer.Option("--csv", help="Write every score to this .csv file.")] = None,
+) -> None:
+    """Score every estimator of tilt on real recordings, beside VQF and imufusion where those are installed.
+
+    \b
+      imufmu benchmark broad
+      imufmu benchmark broad --estimator rizun2008 --delay 0 --csv scores.csv
+
+    Twice: with the parameters of the papers, then with parameters for real recordings. For the columns of a .csv file
+    see imufmu replay --help.
+    """
+    from .evaluate.benchmark import benchmark as score
+    from .evaluate.benchmark import tables, write_scores
+
+    check_target(csv, ".csv")
+    with progress_bar(f"scoring {folder}") as progress:
+        result = score(folder, estimators or (), delay=delay, rest=rest_bias, progress=progress)
+    notes(result.notes)
+    for section in tables(result):
+        out.print(section.heading, markup=False)
+        for point in section.points:
+            out.print(f"  {point}", markup=False)
+        if section.table:
+            print_table(section.table)
+        out.print()
+    if csv:
+        write_scores(csv, result)
+    written(csv)
 
 
-def _check_suffix(path: Path | None, *suffixes: str) -> None:
-    if path and path.suffix.lower() not in suffixes:
-        raise typer.BadParameter(f"{path}: the name must end in {' or '.join(suffixes)}")
+@app.command()
+def predict(
+    imu: Annotated[str, typer.Option("--imu", help="Device (see: imufmu list), or an .ssv file.")] = "mtx",
+    slosh: Annotated[float, typer.Option("--slosh", help="Density of the sensor's velocity (m/s/sqrt(Hz)).")] = 1.0,
+) -> None:
+    """How well this gyroscope can know the vertical in this motion, from the error formulas of Rizun 2008.
 
+    \b
+      imufmu predict --imu mtx --slosh 1.0
 
-def _print_table(table: Table) -> None:
-    """Aligned columns: words left, numbers right. Lines are never folded, so that they survive a pipe."""
-    lines = [table.columns, *table.rows]
-    widths = [max(len(line[i]) for line in lines) for i in range(len(table.columns))]
-    for line in lines:
-        left = [table.words or i == 0 for i in range(len(widths))]
-        cells = (c.ljust(w) if to_left else c.rjust(w) for c, w, to_left in zip(line, widths, left, strict=True))
-        out.print("  ".join(cells).rstrip(), markup=False)
+    A slosh of 1 m/s/sqrt(Hz) is that of a shoe in running.
+    """
+    from .evaluate.prediction import predict as expected
 
-
-def _written(*paths: Path | None) -> None:
-    for path in paths:
-        if path:
-            out.print(f"wrote {path.resolve()}", markup=False)
-
-
-def _notes(notes: tuple[str, ...]) -> None:
-    for note in notes:
-        err.print(f"note: {note}", markup=False)
-
-
-@contextmanager
-def _progress(what: str) -> Iterator[Callable[[int, int], None]]:
-    """A bar on a terminal, nothing elsewhere."""
-    columns = (TextColumn("{task.description}"), BarColumn(), TimeRemainingColumn())
-    with Progress(*columns, console=err, transient=True, disable=not err.is_terminal) as bar:
-        task = bar.add_task(what, total=None)
-        yield lambda done, total: bar.update(task, completed=done, total=total)
+    print_table(expected(imu, slosh))
 
 
 def main() -> None:

@@ -94,6 +94,14 @@ class Recording:
         return gridded
 
 
+def hold_missing(readings: np.ndarray) -> np.ndarray:
+    """Readings (n, k) with the last finite value of the column where one is missing; 0 before the first."""
+    row = np.arange(len(readings))[:, None]
+    last = np.maximum.accumulate(np.where(np.isfinite(readings), row, -1), axis=0)
+    held = np.take_along_axis(readings, np.maximum(last, 0), axis=0)
+    return np.where(last >= 0, held, 0.0)
+
+
 def read(path: str | os.PathLike[str]) -> Recording:
     """Read a recording: ``.csv`` (see above) or ``.mat`` (a trial of BROAD). Raises RecordingError."""
     path = Path(path)

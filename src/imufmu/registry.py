@@ -3,12 +3,19 @@
 from __future__ import annotations
 
 from .block import Block
-from .estimators import lee2012
-from .plants import pendulum
+from .estimators import bennett2014, lee2012, leechoi2018, plumb, rizun2008, zihajehzadeh2014
+from .plants import handheld, pendulum
 from .sensors import imu
 
-ESTIMATORS: tuple[Block, ...] = (lee2012.BLOCK,)
-PLANTS: tuple[Block, ...] = (pendulum.PENDULUM, pendulum.DOUBLE_PENDULUM)
+ESTIMATORS: tuple[Block, ...] = (
+    lee2012.BLOCK,
+    leechoi2018.BLOCK,
+    rizun2008.BLOCK,
+    zihajehzadeh2014.BLOCK,
+    bennett2014.BLOCK,
+    plumb.BLOCK,
+)
+PLANTS: tuple[Block, ...] = (pendulum.PENDULUM, pendulum.DOUBLE_PENDULUM, handheld.BLOCK)
 SENSORS: tuple[Block, ...] = (imu.BLOCK,)
 
 BLOCKS: dict[str, Block] = {block.name: block for block in (*ESTIMATORS, *PLANTS, *SENSORS)}

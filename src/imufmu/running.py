@@ -102,7 +102,8 @@ def simulate(
         done = np.arange(some.start + 1, some.stop + 1)  # solver steps behind us after each column
         whole = done % per_row == 0
         states[done[whole] // per_row] = reached[: len(done)][whole]
-    y = np.array(block.output_function.map(n + 1)(states.T, u.T, np.tile(p[:, None], n + 1), time[None, :])).T
+    reached_at = np.append(start_time, time[:-1] + step)  # t + h as an instance has it, to the last bit
+    y = np.array(block.output_function.map(n + 1)(states.T, u.T, np.tile(p[:, None], n + 1), reached_at[None, :])).T
     bad = np.flatnonzero(~np.isfinite(np.hstack([y, states])).all(axis=1))
     if bad.size:
         raise StepError(diverged(block, time[bad[0]], p[_names(block).index("max_step")]))

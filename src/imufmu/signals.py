@@ -56,9 +56,11 @@ UNITS = {
         Unit("J", {"kg": 1, "m": 2, "s": -2}),
         Unit("uT", {"kg": 1, "s": -2, "A": -1}, factor=1e-6),
         Unit("rad/s/sqrt(Hz)", None),
+        Unit("rad/s2/sqrt(Hz)", None),
         Unit("m/s/sqrt(Hz)", None),
         Unit("m/s2/sqrt(Hz)", None),
         Unit("uT/sqrt(Hz)", None),
+        Unit("1/sqrt(Hz)", None),
     )
 }
 

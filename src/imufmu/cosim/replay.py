@@ -12,7 +12,7 @@ import numpy as np
 
 from ..archives import open_fmu
 from ..fmi.build import cached_fmu
-from ..recordings import Recording
+from ..recordings import Recording, hold_missing
 from ..registry import BLOCKS, ESTIMATORS
 from ..tables import write_csv
 from ..vocabulary import ACCEL, GYRO, MAG
@@ -170,17 +170,9 @@ def _inputs(interface: Interface, recording: Recording, fmu: Path) -> tuple[list
     readings = np.column_stack(columns)
     missing = ~np.isfinite(readings).all(axis=1)
     if missing.any() and "status" not in interface.variables:
-        readings = _held(readings)
+        readings = hold_missing(readings)
         notes.append(f"{missing.sum()} of {len(readings)} samples are incomplete; held, as the FMU has no status")
     return used, readings, notes
-
-
-def _held(readings: np.ndarray) -> np.ndarray:
-    """Every column with its last finite value where one is missing; 0 before the first."""
-    row = np.arange(len(readings))[:, None]
-    last = np.maximum.accumulate(np.where(np.isfinite(readings), row, -1), axis=0)
-    held = np.take_along_axis(readings, np.maximum(last, 0), axis=0)
-    return np.where(last >= 0, held, 0.0)
 
 
 def _settings(interface: Interface, recording: Recording, parameters: dict[str, Any], fmu: Path) -> tuple[Setting, ...]:

@@ -11,7 +11,8 @@
 
 Differences from the paper: roll uses the two-argument arctangent and pitch atan2(-Z1, hypot(Z2, Z3)), which equals (4)
 where (4) can be computed. A threshold that is not met means no update at all (the limit of an infinite variance). A
-sample that is not finite is predicted over; the first usable accelerometer sample starts the filter.
+sample that is not finite is predicted over; the first usable accelerometer sample starts the filter. (12) to (29) stand
+in direction_filter.
 
 [1] Lee, Park, Robinovitch, Estimation of Attitude and External Acceleration Using Inertial Sensor Measurement During
     Various Dynamic Conditions, IEEE TIM 61(8), 2012, doi:10.1109/TIM.2012.2187245
@@ -27,21 +28,31 @@ import casadi as ca
 
 from .. import vocabulary as v
 from ..block import Expressions, SampledBlock
-from ..rotations import roll_pitch, root, skew, unit, vertical_from_roll_pitch
+from ..rotations import roll_pitch, vertical_from_roll_pitch
 from ..signals import Signal, State, integer, real, switch
+from .direction_filter import (
+    ACCEL_VARIANCE,
+    GRAVITY,
+    GYRO_INDEX,
+    GYRO_VARIANCE,
+    first_acceleration,
+    first_vertical,
+    has_vertical,
+    tilt_std,
+    vertical_step,
+)
 
 ENDLESS = 1e9  # more quiet samples than any window asks for
-NO_DIRECTION = 1e-6  # of g: a first accelerometer sample shorter than this points nowhere
-LARGEST_TRACE = 1e6  # of P: a longer prediction without update would overflow; nothing is known by then
 
 
 def initial(u: SimpleNamespace, p: SimpleNamespace) -> Expressions:
     """Attitude from the first accelerometer sample, or from the given angles."""
-    started = ca.logic_or(is_usable(u, p), p.use_initial_angles)
-    Z = start_vertical(u, p)
+    started = ca.logic_or(has_vertical(u, p), p.use_initial_angles)
+    given = vertical_from_roll_pitch(p.initial_roll, p.initial_pitch)
+    Z = ca.if_else(p.use_initial_angles, given, first_vertical(u, p))
     return dict(
         Z=Z,
-        a=ca.if_else(ca.logic_and(started, 1 - u.accel_missing), u.accel - p.g * Z, 0),
+        a=first_acceleration(Z, started, u, p),
         P=p.P0 * ca.SX.eye(3),
         innovation=ca.SX.zeros(3),
         quiet_samples=ca.if_else(is_quiet(u, p), ENDLESS * (1 - p.early_is_moving) + 1, 0),
@@ -50,48 +61,9 @@ def initial(u: SimpleNamespace, p: SimpleNamespace) -> Expressions:
     )
 
 
-def start_vertical(u: SimpleNamespace, p: SimpleNamespace) -> Any:
-    """Up vector in S before any update; (0, 0, 1) as long as nothing is known."""
-    given = vertical_from_roll_pitch(p.initial_roll, p.initial_pitch)
-    measured = ca.if_else(is_usable(u, p), unit(u.accel), ca.DM([0, 0, 1]))
-    return ca.if_else(p.use_initial_angles, given, measured)
-
-
-def is_usable(u: SimpleNamespace, p: SimpleNamespace) -> Any:
-    """1 where the accelerometer sample has a direction to start from."""
-    return ca.logic_and(ca.norm_2(u.accel) > NO_DIRECTION * p.g, 1 - u.accel_missing)
-
-
 def is_quiet(u: SimpleNamespace, p: SimpleNamespace) -> Any:
     """1 where the accelerometer norm is that of gravity, (30) for one tau."""
     return ca.logic_and(ca.fabs(ca.norm_2(u.accel) - p.g) <= p.eps_a, 1 - u.accel_missing)
-
-
-def rate(u: SimpleNamespace, p: SimpleNamespace) -> Any:
-    """Gyroscope sample of the prediction from t-1 to t: y_G,t-1 as printed, y_G,t, or their mean."""
-    mean = (u.gyro_previous + u.gyro) / 2
-    return ca.if_else(p.gyro_index == 0, u.gyro_previous, ca.if_else(p.gyro_index == 1, u.gyro, mean))
-
-
-def predict(x: SimpleNamespace, gyro: Any, p: SimpleNamespace) -> tuple[Any, Any]:
-    """A priori up vector and covariance."""
-    dt = p.sample_period
-    Phi = ca.SX.eye(3) - dt * skew(gyro)  # (12)
-    Q = -(dt**2) * p.sigma_g2 * skew(x.Z) @ skew(x.Z)  # (15)
-    P = Phi @ x.P @ Phi.T + Q  # (25)
-    return Phi @ x.Z, P / ca.fmax(1, ca.trace(P) / LARGEST_TRACE)  # (24)
-
-
-def update(Z: Any, P: Any, z: Any, M: Any, g: Any, accepted: Any) -> tuple[Any, Any, Any]:
-    """A posteriori up vector of unit length, covariance, innovation; unchanged but for the length if not accepted.
-
-    M: scalar, the measurement variance of each axis.
-    """
-    innovation = z - g * Z
-    inverse = ca.inv_minor(g**2 * P + M * ca.SX.eye(3))
-    K = ca.if_else(accepted, g * P @ inverse, 0)  # (26), H = g I
-    I_KH = ca.if_else(accepted, M * inverse, ca.SX.eye(3))  # I - g K, without its cancellation where g^2 P >> M
-    return unit(Z + K @ innovation), I_KH @ P, innovation  # (27), (28)
 
 
 def step(x: SimpleNamespace, u: SimpleNamespace, p: SimpleNamespace) -> Expressions:
@@ -100,27 +72,11 @@ def step(x: SimpleNamespace, u: SimpleNamespace, p: SimpleNamespace) -> Expressi
     still = quiet_samples >= p.n + ca.if_else(p.window_excludes_start, 0, 1)  # (30)
     rejected = ca.logic_and(p.mode == 3, ca.logic_not(still))
     accepted = ca.logic_and(1 - u.accel_missing, ca.logic_not(rejected))
-
     c_a = ca.if_else(p.mode == 1, p.c_a, 0)
-    M = c_a**2 * ca.sumsqr(x.a) / 3 + p.sigma_a2  # (22), (23)
-    Z, P = predict(x, rate(u, p), p)
-    Z, P, innovation = update(Z, P, u.accel - c_a * x.a, M, p.g, accepted)  # z: (18)
-    filtered = dict(
-        Z=Z,
-        a=ca.if_else(u.accel_missing, x.a, u.accel - p.g * Z),  # (29)
-        P=P,
-        innovation=ca.if_else(u.accel_missing, 0, innovation),
-        quiet_samples=quiet_samples,
-        rejected=rejected,
-        started=1,
-    )
+    Z, a, P, innovation = vertical_step(x.Z, x.a, x.P, u, p, c_a=c_a, accepted=accepted)  # (18) to (29)
+    filtered = dict(Z=Z, a=a, P=P, innovation=innovation, quiet_samples=quiet_samples, rejected=rejected, started=1)
     fresh = initial(u, p)
     return {name: ca.if_else(x.started, value, fresh[name]) for name, value in filtered.items()}
-
-
-def tilt_std(Z: Any, P: Any) -> Any:
-    """One-sigma tilt (rad) from the covariance of the up vector: its part perpendicular to the vector."""
-    return root(ca.trace(P) - Z.T @ P @ Z)
 
 
 def output(x: SimpleNamespace, u: SimpleNamespace, p: SimpleNamespace) -> Expressions:
@@ -160,18 +116,9 @@ near g for n samples. The filter has no gyroscope bias state: remove a constant 
     own_parameters=(
         integer("mode", 1, (1, 3), "1 acceleration model, 2 static, 3 threshold switching", tunable=True),
         real("c_a", "1", 0.1, (0, 1), "Mode 1: part of the acceleration kept to the next sample", tunable=True),
-        real(
-            "sigma_g2", "rad2/s2", 1e-4, (0, 1e3), "Gyroscope variance per sample; larger trusts it less", tunable=True
-        ),
-        real(
-            "sigma_a2",
-            "m2/s4",
-            1e-4,
-            (1e-9, 1e6),
-            "Accelerometer variance per sample; larger trusts it less",
-            tunable=True,
-        ),
-        real("g", "m/s2", 9.8, (1, 100), "Magnitude of gravity; 9.8 is the paper's value"),
+        GYRO_VARIANCE,
+        ACCEL_VARIANCE,
+        GRAVITY,
         real(
             "eps_a",
             "m/s2",
@@ -183,9 +130,7 @@ near g for n samples. The filter has no gyroscope bias state: remove a constant 
         integer("n", 4, (0, 10**6), "Mode 3: length of the window in sample periods", tunable=True),
         switch("window_excludes_start", "Mode 3: 0 window of n + 1 samples as in (30), 1 of n samples"),
         switch("early_is_moving", "Mode 3: while the window is not full, 0 judge by the samples there are, 1 moving"),
-        integer(
-            "gyro_index", 0, (0, 2), "Gyroscope sample of the prediction: 0 previous (as printed), 1 current, 2 mean"
-        ),
+        GYRO_INDEX,
         real("P0", "1", 1.0, (0, 1e5), "Variance of the vertical at the start, each axis"),
         switch(
             "use_initial_angles", "0 start from the first accelerometer sample, 1 from initial_roll and initial_pitch"

@@ -28,21 +28,24 @@ class Table:
 
 @dataclass(frozen=True)
 class Section:
-    """One part of a report; what is empty is left out."""
+    """One part of a report; what is empty is left out.
+
+    points: a list below the text. figure: to draw, or a PNG image. level: 2, or 3 for a part of the section before.
+    """
 
     heading: str
     text: str = ""
     table: Table | None = None
-    figure: Figure | None = None
+    figure: Figure | bytes | None = None
     caption: str = ""
+    points: Sequence[str] = ()
+    level: int = 2
 
 
 def write_report(path: Path, title: str, lead: str, sections: Sequence[Section]) -> None:
     """Write the page, whole or not at all. Raises WriteError."""
     environment = Environment(loader=PackageLoader("imufmu.evaluate"), autoescape=True, undefined=StrictUndefined)
-    shown = [
-        (section, base64.b64encode(png(section.figure)).decode() if section.figure else "") for section in sections
-    ]
+    shown = [(section, base64.b64encode(_image(section.figure)).decode()) for section in sections]
     page = environment.get_template("report.html").render(
         title=title,
         lead=lead,
@@ -52,3 +55,7 @@ def write_report(path: Path, title: str, lead: str, sections: Sequence[Section])
     )
     with atomic_write(path) as temporary:
         temporary.write_text(page, encoding="utf-8")
+
+
+def _image(figure: Figure | bytes | None) -> bytes:
+    return png(figure) if isinstance(figure, Figure) else figure or b""

@@ -1,4 +1,4 @@
-"""Build FMUs: a script of fmu_src, the runtime, the documentation and an icon in one archive.
+"""Build Python FMUs: a script of fmu_src, the runtime, the documentation and an icon in one archive.
 
 The same source gives the same bytes: no time stamps, no random GUID, files in sorted order.
 """
@@ -9,6 +9,7 @@ import hashlib
 import sys
 import tempfile
 import zipfile
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from platformdirs import user_cache_path
@@ -49,13 +50,18 @@ def build_fmu(name: str, folder: Path) -> Path:
 
 def cached_fmu(name: str) -> Path:
     """Path of the FMU of a registered block in the user's cache, built when its source has changed."""
-    sources = [*Path(__file__).parent.rglob("*.[pj]*"), fmu_src_folder() / f"{name}_fmu.py"]
-    digest = hashlib.sha256(runtime.fingerprint(runtime.PACKAGE).encode())
-    for source in sorted(path for path in sources if path.is_file()):
-        digest.update(source.read_bytes())
-    folder = user_cache_path("imufmu") / f"{__version__}-{digest.hexdigest()[:16]}"
+    folder = user_cache_path("imufmu") / f"{__version__}-{source_digest([fmu_src_folder() / f'{name}_fmu.py'])}"
     path = folder / f"{name}.fmu"
     return path if path.is_file() else build_fmu(name, folder)
+
+
+def source_digest(sources: Sequence[Path]) -> str:
+    """Short hash of the runtime, of what makes FMUs of it, and of these files; those that are missing are left out."""
+    makers = [path for path in Path(__file__).parent.rglob("*") if "__pycache__" not in path.parts]
+    digest = hashlib.sha256(runtime.fingerprint(runtime.PACKAGE).encode())
+    for source in sorted(path for path in (*makers, *sources) if path.is_file()):
+        digest.update(source.read_bytes())
+    return digest.hexdigest()[:16]
 
 
 def _pythonfmu_build(name: str, scratch: Path) -> Path:
@@ -85,9 +91,15 @@ def _pythonfmu_build(name: str, scratch: Path) -> Path:
 
 
 def _repack(built: Path, name: str, target: Path) -> None:
-    """Same members in sorted order with a fixed time, plus the icon."""
-    with zipfile.ZipFile(built) as source, zipfile.ZipFile(target, "w", zipfile.ZIP_DEFLATED) as archive:
-        members = {member: source.read(member) for member in source.namelist()} | {"model.png": icon(name)}
+    """Same members, plus the icon."""
+    with zipfile.ZipFile(built) as source:
+        members = {member: source.read(member) for member in source.namelist()}
+    write_archive(members | {"model.png": icon(name)}, target)
+
+
+def write_archive(members: Mapping[str, bytes], target: Path) -> None:
+    """Zip the members, content by name, in sorted order with a fixed time: the same members give the same bytes."""
+    with zipfile.ZipFile(target, "w", zipfile.ZIP_DEFLATED) as archive:
         for member, content in sorted(members.items()):
             entry = zipfile.ZipInfo(member, _FIXED_TIME)
             entry.compress_type = zipfile.ZIP_DEFLATED

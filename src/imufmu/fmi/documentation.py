@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 import io
+from collections.abc import Sequence
 from pathlib import Path
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
@@ -41,11 +42,12 @@ def equations(block: Block) -> str:
     return inspect.cleandoc(module.__doc__ or "") if module else ""
 
 
-def write_documentation(block: Block, folder: Path) -> None:
-    """Write index.html into a new folder."""
+def documentation_page(block: Block, platforms: Sequence[str] = ()) -> str:
+    """HTML page of the block's FMU. platforms: those of a native FMU; none for the Python FMU."""
     environment = Environment(loader=PackageLoader("imufmu.fmi"), autoescape=True, undefined=StrictUndefined)
-    page = environment.get_template("documentation.html").render(
+    return environment.get_template("documentation.html").render(
         block=block,
+        platforms=platforms,
         version=__version__,
         sampled=isinstance(block, SampledBlock),
         equations=equations(block),
@@ -56,8 +58,12 @@ def write_documentation(block: Block, folder: Path) -> None:
             "Local variables": signal_rows(block.locals),
         },
     )
+
+
+def write_documentation(block: Block, folder: Path) -> None:
+    """Write index.html of the Python FMU into a new folder."""
     folder.mkdir()
-    (folder / "index.html").write_text(page, encoding="utf-8")
+    (folder / "index.html").write_text(documentation_page(block), encoding="utf-8")
 
 
 def icon(name: str) -> bytes:

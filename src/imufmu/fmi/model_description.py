@@ -1,4 +1,7 @@
-"""The modelDescription.xml of a block, for every kind of FMU."""
+"""The modelDescription.xml of a block, for both kinds of FMU: in Python and native.
+
+They differ in what the native one adds: its sources, and derivatives of its outputs.
+"""
 
 from __future__ import annotations
 
@@ -16,6 +19,7 @@ from ..signals import UNITS, Parameter
 
 _NAMESPACE = uuid.UUID("7b0c9d52-4a0e-5c8e-9a53-3f6d8f0f7c11")  # of imufmu's GUIDs; any fixed value serves
 _STOP_TIME = 10.0
+NATIVE_SOURCE = "fmu.c"  # includes all others
 _PLANT_STEP = 0.01
 
 LOG_CATEGORIES = {
@@ -36,17 +40,17 @@ def value_references(block: Block) -> list[tuple[int, Variable]]:
     return listed
 
 
-def guid(block: Block) -> str:
-    """GUID that follows from the declaration alone: interface and equations."""
-    digest = hashlib.sha256(tostring(_description(block, "")))
+def guid(block: Block, *, native: bool = False) -> str:
+    """GUID that follows from the declaration alone: interface and equations. Each kind of FMU has its own."""
+    digest = hashlib.sha256(tostring(_description(block, "", native)))
     for function in _functions(block):
         digest.update(function.serialize().encode())
     return f"{{{uuid.uuid5(_NAMESPACE, digest.hexdigest())}}}"
 
 
-def model_description(block: Block) -> Element:
+def model_description(block: Block, *, native: bool = False) -> Element:
     """Root element of modelDescription.xml."""
-    return _description(block, guid(block))
+    return _description(block, guid(block, native=native), native)
 
 
 def _functions(block: Block) -> list[ca.Function]:
@@ -56,7 +60,7 @@ def _functions(block: Block) -> list[ca.Function]:
     return [block.initial_function, block.advance_function, block.output_function]
 
 
-def _description(block: Block, identity: str) -> Element:
+def _description(block: Block, identity: str, native: bool) -> Element:
     root = Element(
         "fmiModelDescription",
         fmiVersion="2.0",
@@ -68,7 +72,7 @@ def _description(block: Block, identity: str) -> Element:
         generationTool=f"imufmu {__version__}",
         variableNamingConvention="structured",
     )
-    SubElement(
+    slave = SubElement(
         root,
         "CoSimulation",
         modelIdentifier=block.name,
@@ -79,10 +83,12 @@ def _description(block: Block, identity: str) -> Element:
         canNotUseMemoryManagementFunctions="true",
         canGetAndSetFMUstate="true",
         canSerializeFMUstate="true",
-        providesDirectionalDerivative="false",
+        providesDirectionalDerivative="true" if native else "false",
     )
+    if native:
+        SubElement(SubElement(slave, "SourceFiles"), "File", name=NATIVE_SOURCE)
     listed = value_references(block)
-    _units(root, {variable.signal.unit for _, variable in listed if _kind(variable) == "Real"})
+    _units(root, {variable.signal.unit for _, variable in listed if variable_type(variable) == "Real"})
     categories = SubElement(root, "LogCategories")
     for name, description in LOG_CATEGORIES.items():
         SubElement(categories, "Category", name=name, description=description)
@@ -107,7 +113,8 @@ def _units(root: Element, used: Iterable[str]) -> None:
             SubElement(element, "DisplayUnit", name=unit.display[0], factor=_number(unit.display[1]))
 
 
-def _kind(variable: Variable) -> str:
+def variable_type(variable: Variable) -> str:
+    """Real, Integer or Boolean."""
     signal = variable.signal
     return signal.kind.capitalize() if isinstance(signal, Parameter) else "Real"
 
@@ -125,7 +132,7 @@ def _scalar_variable(parent: Element, block: Block, reference: int, variable: Va
         attributes |= {"causality": variable.group, "variability": variability, "initial": "calculated"}
     element = SubElement(parent, "ScalarVariable", attributes)
     has_start = variable.group in ("input", "parameter")
-    match _kind(variable):
+    match variable_type(variable):
         case "Real":
             unit = UNITS[signal.unit]
             shown = {"displayUnit": unit.display[0]} if unit.display else {}

@@ -104,12 +104,12 @@ class BlockSlave(Fmi2Slave):
 
     def _report_missing_inputs(self) -> None:
         """Log once per episode which inputs are not finite."""
-        missing = not math.isfinite(sum(self._instance.u.tolist()))
-        if missing and not self._missing:
+        names = []
+        if not math.isfinite(sum(self._instance.u.tolist())):  # one sum is cheaper than many questions
             names = [v.name for v in self.block.variables[: self._inputs] if not math.isfinite(self._values[v.index])]
-            if names:
-                self.log(f"{self.block.name}: not finite, treated as missing: {', '.join(names)}", Fmi2Status.warning)
-        self._missing = missing
+        if names and not self._missing:
+            self.log(f"{self.block.name}: not finite, treated as missing: {', '.join(names)}", Fmi2Status.warning)
+        self._missing = bool(names)
 
     def _refresh(self) -> None:
         """Bring the outputs up to date with what was set."""

@@ -1,0 +1,79 @@
+/* FMI functions: stepping, and what belongs to steps that take a while or interpolate, which these FMUs never do. */
+
+/* Warn once per episode which inputs are not finite. Returns the status of the step. */
+static fmi2Status report_missing_inputs(Instance *c) {
+    char names[MESSAGE_SIZE];
+    size_t n = 0;
+    for (int i = 0; i < N_INPUTS && n < sizeof names; i++) {
+        if (isfinite(c->state.values[i])) continue;
+        n += (size_t)snprintf(names + n, sizeof names - n, "%s%s",
+                              n ? ", " : MODEL_NAME ": not finite, treated as missing: ", VARIABLES[i].name);
+    }
+    bool begins = n > 0 && !c->state.missing;
+    c->state.missing = n > 0;
+    if (!begins) return fmi2OK;
+    warn(c, names);
+    return fmi2Warning;
+}
+
+fmi2Status fmi2DoStep(fmi2Component component, fmi2Real t, fmi2Real h, fmi2Boolean noSetFMUStatePriorToCurrentPoint) {
+    Instance *c = component;
+    (void)noSetFMUStatePriorToCurrentPoint;
+    if (!in_phase(c, "fmi2DoStep", STEPPING)) return fmi2Error;
+    if (!(isfinite(t) && isfinite(h) && h > 0)) {
+        return refuse(c, "cannot step from t = %.15g s by h = %.15g s; h must be positive and finite", t, h);
+    }
+    if (h / c->state.values[PERIOD] > LONGEST_STEP) {
+        return refuse(c, "a step of h = %.15g s is more than %g internal steps", h, LONGEST_STEP);
+    }
+    fmi2Status status = engine_step(c, t, h);
+    if (status != fmi2OK) return status;
+    c->state.stale = false;
+    return report_missing_inputs(c);
+}
+
+fmi2Status fmi2CancelStep(fmi2Component c) {
+    return c ? refuse(c, "no step is pending that could be cancelled") : fmi2Error;
+}
+
+static fmi2Status never_pending(fmi2Component c, const void *value) {
+    (void)value;
+    return c ? fmi2Discard : fmi2Error;
+}
+
+fmi2Status fmi2GetStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Status *value) {
+    (void)kind;
+    return never_pending(c, value);
+}
+
+fmi2Status fmi2GetRealStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Real *value) {
+    (void)kind;
+    return never_pending(c, value);
+}
+
+fmi2Status fmi2GetIntegerStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Integer *value) {
+    (void)kind;
+    return never_pending(c, value);
+}
+
+fmi2Status fmi2GetBooleanStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Boolean *value) {
+    (void)kind;
+    return never_pending(c, value);
+}
+
+fmi2Status fmi2GetStringStatus(fmi2Component c, const fmi2StatusKind kind, fmi2String *value) {
+    (void)kind;
+    return never_pending(c, value);
+}
+
+fmi2Status fmi2SetRealInputDerivatives(fmi2Component c, const fmi2ValueReference vr[], size_t n,
+                                       const fmi2Integer order[], const fmi2Real value[]) {
+    (void)vr, (void)n, (void)order, (void)value;
+    return c ? refuse(c, "inputs are held over a step, not interpolated (canInterpolateInputs is false)") : fmi2Error;
+}
+
+fmi2Status fmi2GetRealOutputDerivatives(fmi2Component c, const fmi2ValueReference vr[], size_t n,
+                                        const fmi2Integer order[], fmi2Real value[]) {
+    (void)vr, (void)n, (void)order, (void)value;
+    return c ? refuse(c, "there are no time derivatives of outputs (maxOutputDerivativeOrder is 0)") : fmi2Error;
+}

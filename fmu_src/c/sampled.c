@@ -1,0 +1,79 @@
+/* A sampled block: takes every instant t_k = start_time + k sample_period in [t, t + h) of a step, with the inputs in
+   force, and holds its outputs between. k is a whole number. */
+
+static double sample_period(Instance *c) { return c->state.values[PERIOD]; }
+
+static void evaluate_first(Instance *c, double *x) {
+    const double *arg[N_ARGUMENTS] = {inputs_of(c), parameters_of(c), c->draws};
+    double *res[N_RESULTS] = {x, reported_by(c)};
+    block_first(arg, res, c->integer_work, c->work, 0);
+}
+
+static void evaluate_next(Instance *c, double *x) {
+    const double *arg[N_ARGUMENTS] = {c->state.x, inputs_of(c), parameters_of(c), c->draws};
+    double *res[N_RESULTS] = {x, reported_by(c)};
+    block_next(arg, res, c->integer_work, c->work, 0);
+}
+
+static void remember_inputs(State *s) { memcpy(s->sampled_inputs, s->values, N_INPUTS * sizeof(double)); }
+
+/* Instant that the outputs belong to; the start time before the first sample. */
+static void stamp(Instance *c) {
+    State *s = &c->state;
+    double k = s->next_sample > 0 ? (double)(s->next_sample - 1) : 0.0;
+    s->values[SAMPLE_TIME] = s->start_time + k * sample_period(c);
+}
+
+/* Outputs as of the first sample if it were taken now; nothing once it was taken. */
+static void engine_refresh(Instance *c) {
+    if (c->state.next_sample > 0) return;
+    draw(c, 0);
+    remember_inputs(&c->state);
+    evaluate_first(c, c->x_next);
+    stamp(c);
+}
+
+static void engine_initialise(Instance *c) {
+    c->state.next_sample = 0;
+    engine_refresh(c);
+}
+
+static void take_sample(Instance *c) {
+    State *s = &c->state;
+    draw(c, s->next_sample);
+    remember_inputs(s);
+    memcpy(s->sampled_from, s->x, sizeof s->x);
+    if (s->next_sample == 0) {
+        evaluate_first(c, c->x_next);
+    } else {
+        evaluate_next(c, c->x_next);
+    }
+    memcpy(s->x, c->x_next, sizeof s->x);
+    s->next_sample++;
+    stamp(c);
+}
+
+static fmi2Status engine_step(Instance *c, double t, double h) {
+    State *s = &c->state;
+    double end = (t + h - s->start_time) / sample_period(c) - CLOCK_TOLERANCE;
+    if (!(fabs(end - (double)s->next_sample) <= LONGEST_STEP)) {
+        return refuse(c, "t = %.15g s lies more than %g samples away", t, LONGEST_STEP);
+    }
+    int64_t after_last = (int64_t)ceil(end);
+    while (s->next_sample < after_last) take_sample(c);
+    return fmi2OK;
+}
+
+/* Change dy of the outputs of the last sample with a change du of its inputs: exact, at the parameters in force. */
+static void engine_derivative(Instance *c, const double *du, double *dy) {
+    State *s = &c->state;
+    double *res[N_RESULTS] = {dy};
+    draw(c, s->next_sample > 0 ? s->next_sample - 1 : 0);
+    if (s->next_sample <= 1) {
+        const double *arg[N_ARGUMENTS] = {s->sampled_inputs, parameters_of(c), c->draws, du};
+        block_first_derivative(arg, res, c->integer_work, c->work, 0);
+    } else {
+        const double *arg[N_ARGUMENTS] = {s->sampled_from, s->sampled_inputs, parameters_of(c), c->draws, du};
+        block_next_derivative(arg, res, c->integer_work, c->work, 0);
+    }
+}

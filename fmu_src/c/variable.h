@@ -1,0 +1,13 @@
+/* What block.c says about each variable. The value reference of a variable is its place in the table. */
+
+typedef enum { REAL, INTEGER, BOOLEAN } Type;
+
+typedef enum { INPUT, FIXED, TUNABLE, OUTPUT, LOCAL } Role; /* FIXED and TUNABLE are parameters */
+
+typedef struct {
+    const char *name;
+    const char *unit; /* with a blank before it, for messages; empty for a pure number */
+    Type type;
+    Role role;
+    double start, minimum, maximum;
+} Variable;

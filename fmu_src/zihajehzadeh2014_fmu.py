@@ -1,0 +1,8 @@
+"""FMU of the cascade of tilt and yaw Kalman filters of Zihajehzadeh et al. (2014)."""
+
+from imufmu.estimators import zihajehzadeh2014
+from imufmu.fmi.slave import BlockSlave
+
+
+class Zihajehzadeh2014(BlockSlave):
+    block = zihajehzadeh2014.BLOCK

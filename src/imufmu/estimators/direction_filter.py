@@ -1,0 +1,109 @@
+"""Kalman filter of a fixed direction, seen from the sensor: the equations that several papers share.
+
+A direction that stands still in N turns in S against the gyroscope. lee2012 [1] tracks the vertical, from the
+accelerometer and a model of the external acceleration; zihajehzadeh2014 tracks the vertical in the same way and East
+from the magnetometer. Equation numbers are those of [1].
+
+    paper   here   unit    meaning
+    Z       d      1       the direction in S, of any length
+    P       P      1       its covariance
+    Z+, a+  Z, a   1, m/s2 vertical and external acceleration, a posteriori
+
+A block that uses this module declares GYRO_VARIANCE and GYRO_INDEX, and ACCEL_VARIANCE and GRAVITY for the vertical.
+
+[1] Lee, Park, Robinovitch, Estimation of Attitude and External Acceleration Using Inertial Sensor Measurement During
+    Various Dynamic Conditions, IEEE TIM 61(8), 2012, doi:10.1109/TIM.2012.2187245
+"""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import casadi as ca
+
+from ..rotations import root, skew, unit
+from ..signals import integer, real
+
+NO_DIRECTION = 1e-6  # of the usual magnitude: a first sample shorter than this points nowhere
+LARGEST_TRACE = 1e6  # of P: a longer prediction without update would overflow; nothing is known by then
+LARGEST_LENGTH = 1e3  # of a direction that is not normalised: (12) makes it longer with every sample
+
+GYRO_VARIANCE = real(
+    "sigma_g2", "rad2/s2", 1e-4, (0, 1e3), "Gyroscope variance per sample; larger trusts it less", tunable=True
+)
+ACCEL_VARIANCE = real(
+    "sigma_a2", "m2/s4", 1e-4, (1e-9, 1e6), "Accelerometer variance per sample; larger trusts it less", tunable=True
+)
+GRAVITY = real("g", "m/s2", 9.8, (1, 100), "Magnitude of gravity; 9.8 as in Lee et al. 2012")
+GYRO_INDEX = integer(
+    "gyro_index", 0, (0, 2), "Gyroscope sample of the prediction: 0 previous (as printed), 1 current, 2 mean"
+)
+
+
+def rate(u: SimpleNamespace, p: SimpleNamespace) -> Any:
+    """Gyroscope sample of the prediction from t-1 to t: y_G,t-1 as printed, y_G,t, or their mean."""
+    mean = (u.gyro_previous + u.gyro) / 2
+    return ca.if_else(p.gyro_index == 0, u.gyro_previous, ca.if_else(p.gyro_index == 1, u.gyro, mean))
+
+
+def predict(d: Any, P: Any, gyro: Any, p: SimpleNamespace) -> tuple[Any, Any]:
+    """A priori direction and covariance."""
+    dt = p.sample_period
+    Phi = ca.SX.eye(3) - dt * skew(gyro)  # (12)
+    Q = -(dt**2) * p.sigma_g2 * skew(d) @ skew(d)  # (15)
+    P = Phi @ P @ Phi.T + Q  # (25)
+    return Phi @ d, P / ca.fmax(1, ca.trace(P) / LARGEST_TRACE)  # (24)
+
+
+def update(d: Any, P: Any, z: Any, M: Any, scale: Any, accepted: Any) -> tuple[Any, Any, Any]:
+    """A posteriori direction (not normalised), covariance, innovation; direction and covariance as before if not
+    accepted.
+
+    z (3,): measurement of scale * d. M: scalar, the variance of each of its elements.
+    """
+    innovation = z - scale * d
+    inverse = ca.inv_minor(scale**2 * P + M * ca.SX.eye(3))
+    K = ca.if_else(accepted, scale * P @ inverse, 0)  # (26), H = scale I
+    I_KH = ca.if_else(accepted, M * inverse, ca.SX.eye(3))  # I - K H, without its cancellation where H P H' >> M
+    return d + K @ innovation, I_KH @ P, innovation  # (27), (28)
+
+
+def normalised(d: Any, switch: Any) -> Any:
+    """d of unit length; where ``switch`` is 0 as it is, up to LARGEST_LENGTH."""
+    return ca.if_else(switch, unit(d), d / ca.fmax(1, ca.norm_2(d) / LARGEST_LENGTH))
+
+
+def has_vertical(u: SimpleNamespace, p: SimpleNamespace) -> Any:
+    """1 where the accelerometer sample has a direction to start from."""
+    return ca.logic_and(ca.norm_2(u.accel) > NO_DIRECTION * p.g, 1 - u.accel_missing)
+
+
+def first_vertical(u: SimpleNamespace, p: SimpleNamespace) -> Any:
+    """Up vector in S from one accelerometer sample; (0, 0, 1) where it has no direction."""
+    return ca.if_else(has_vertical(u, p), unit(u.accel), ca.DM([0, 0, 1]))
+
+
+def first_acceleration(Z: Any, started: Any, u: SimpleNamespace, p: SimpleNamespace) -> Any:
+    """External acceleration of the first sample: what gravity along Z leaves of it."""
+    return ca.if_else(ca.logic_and(started, 1 - u.accel_missing), u.accel - p.g * Z, 0)
+
+
+def vertical_step(
+    Z: Any, a: Any, P: Any, u: SimpleNamespace, p: SimpleNamespace, *, c_a: Any, accepted: Any, normalise: Any = 1
+) -> tuple[Any, Any, Any, Any]:
+    """Vertical, external acceleration, covariance and innovation (m/s2), one sample on.
+
+    c_a: part of the acceleration that the model keeps; 0 is no model. accepted: 0 predicts only.
+    """
+    M = c_a**2 * ca.sumsqr(a) / 3 + p.sigma_a2  # (22), (23)
+    Z, P = predict(Z, P, rate(u, p), p)
+    Z, P, innovation = update(Z, P, u.accel - c_a * a, M, p.g, accepted)  # z: (18)
+    Z = normalised(Z, normalise)
+    a = ca.if_else(u.accel_missing, a, u.accel - p.g * Z)  # (29)
+    return Z, a, P, ca.if_else(u.accel_missing, 0, innovation)
+
+
+def tilt_std(Z: Any, P: Any) -> Any:
+    """One-sigma tilt (rad) from the covariance of the up vector Z: its part perpendicular to the vector."""
+    return root(ca.trace(P) - Z.T @ P @ Z)

@@ -1,0 +1,365 @@
+"""Attitude from the assumption that velocity is white noise: an error-state Kalman filter.
+
+Over a moment, a tilt and an acceleration look alike to an accelerometer. In the long run they do not: gravity lasts,
+while the velocity of a hand, a limb or a tool stays near zero. Rizun [1] takes velocity for white noise and derives a
+fixed filter. The same model stands here in a Kalman filter that also learns bias, scale and cross-axis errors of the
+gyroscope, follows the liveliness of the motion, and uses rest where there is any.
+
+    symbol           here             unit      meaning
+    R                x.q              1         attitude, S to N; its yaw is 0 at the start
+    v                x.v              m/s       velocity in N
+    b, D             x.b, x.D         rad/s, 1  gyroscope bias; scale (diagonal) and cross-axis errors
+    psi, dv, db, dD  PSI, V, B, D     ...       errors: R_true = exp([psi]) R, v_true = v + dv, ...
+    P                x.P              ...       their covariance, 18 x 18, upper triangle
+    V                x.speed2         m2/s2     mean square of v on one axis, low-passed
+    y_g, y_a         u.gyro, u.accel  rad/s, m/s2
+
+Every sample, of period dt, with e_z the up vector in N and dD row by row:
+
+    w = (I + D) (y_g - b),   R+ = R exp([w] dt),   Rbar = (R + R+) / 2                         (1)
+    dV += R+ y_a dt,   T += dt,   S += Rbar dt,   theta += w dt                                (2)
+    blind += dt on every axis whose gyroscope is saturated                                     (3)
+
+After m = round(h / dt) samples, a block of H = m dt, the slow step. Prediction:
+
+    v += dV - g e_z T                                                                          (4)
+    psi' = psi - S db + S dD theta / H,   dv' = dv - [dV] psi                                  (5)
+    Q = diag(s_g^2 H I + R W R',  s_a^2 H I + s_m^2 (H - T) I,  s_b^2 H I,  0),
+        W = k_g^2 theta theta' / H + s_s^2 diag(blind)                                         (6)
+
+then measurements, one element after the other, and their results:
+
+    in motion   v = 0 with variance s_v^2 q / H,   q = sqrt(max(V, v2^2)) / k_v                (7)
+    at rest     v = 0 with variance rr_v^2 / H,    b = low-passed y_g with rr_g^2 / H          (8)
+    R <- exp([psi]) R,   v += dv,   b += db,   D += dD,   t_l dV/dt = |v|^2 / 3 - V            (9)
+
+(5) is R' = R [w] and v' = R y_a - g e_z, true minus estimated, to first order; dD and the noise of (6) see the mean
+rate of the block, for its change within 0.05 s makes no difference to what is learnt. (7) is white velocity of density
+s_v^2 q ((m/s)^2/Hz), averaged over H. Motion within a reach L takes L / |v|, so its density goes with |v| L:
+s_v^2 / k_v = 0.18 m is that reach. k_g leaves room for errors that grow with the rate and that D cannot hold, such as
+those of timing. It is rest after rr_t of |y_g - low-pass| < rr_dg, |y_a - low-pass| < rr_da and, on each axis, a
+low-passed gyroscope below rr_b; the low-pass has the time constant rr_l.
+
+A gyroscope sample that is not finite is held and counts as saturated on every axis. An accelerometer sample that is not
+finite leaves dV and T as they are. Variances of psi and b stop at 1 (rad, rad/s): yaw is never observed.
+At the start P0 lets the filter begin in the middle of a motion; from rest it is at home at once.
+
+[1] Rizun, Optimal Wiener Filter for a Body Mounted Inertial Attitude Sensor, Journal of Navigation 61, 2008,
+    doi:10.1017/S0373463308004736
+"""
+
+from __future__ import annotations
+
+from math import radians
+from types import SimpleNamespace
+from typing import Any
+
+import casadi as ca
+
+from .. import vocabulary as v
+from ..block import Expressions, SampledBlock
+from ..rotations import (
+    euler_from_quaternion,
+    matrix_from_quaternion,
+    multiply,
+    quaternion_from_euler,
+    quaternion_from_rotation_vector,
+    roll_pitch,
+    root,
+    rotate_back,
+    skew,
+    unit,
+)
+from ..signals import Signal, State, real
+from .direction_filter import first_vertical, has_vertical
+from .kalman import update
+
+PSI, V, B, D = (slice(0, 3), slice(3, 6), slice(6, 9), slice(9, 18))
+N_ERRORS = 18
+SATURATED = 0.95  # of the gyroscope's range
+LARGEST_VARIANCE = 1.0  # rad2 of psi, rad2/s2 of b
+LARGEST_BIAS = 1.0  # rad/s
+LARGEST_GYRO_ERROR = 0.2  # 1, each element of D
+
+I3 = ca.SX.eye(3)
+UP = ca.DM([0, 0, 1])
+
+
+def initial(u: SimpleNamespace, p: SimpleNamespace) -> Expressions:
+    """The first sample."""
+    std = ca.vertcat(*[p.P0_psi] * 3, *[p.P0_v] * 3, *[p.P0_b] * 3, *[p.P0_D] * 9)
+    return dict(
+        q=first_attitude(u, p),
+        started=has_vertical(u, p),
+        gyro_lp=u.gyro,
+        accel_lp=u.accel,
+        still_samples=0,
+        **empty_block(),
+        v=ca.SX.zeros(3),
+        b=ca.SX.zeros(3),
+        D=ca.SX.zeros(3, 3),
+        P=upper_triangle(ca.diag(std**2)),
+        speed2=0,
+    )
+
+
+def first_attitude(u: SimpleNamespace, p: SimpleNamespace) -> Any:
+    """q_NS of yaw 0 from one accelerometer sample."""
+    return quaternion_from_euler(*roll_pitch(first_vertical(u, p)), 0)
+
+
+def empty_block() -> Expressions:
+    """The sums over a block, at its beginning."""
+    zero = ca.SX.zeros(3)
+    return dict(samples=0, dV=zero, T=0, S=ca.SX.zeros(3, 3), theta=zero, blind=zero)
+
+
+def step(x: SimpleNamespace, u: SimpleNamespace, p: SimpleNamespace) -> Expressions:
+    """Every further sample: attitude, sums of the block, test for rest."""
+    w = rate(x, u)
+    q = multiply(x.q, quaternion_from_rotation_vector(w * p.sample_period))  # (1)
+    R = matrix_from_quaternion(q)
+    R_bar = (matrix_from_quaternion(x.q) + R) / 2
+    blind = ca.fmax(ca.fabs(u.gyro) > SATURATED * p.gyro_range, u.gyro_missing)
+    dt = ca.if_else(x.started, p.sample_period, 0)
+    T = ca.if_else(u.accel_missing, 0, dt)
+    return dict(
+        q=ca.if_else(x.started, q, first_attitude(u, p)),
+        started=ca.logic_or(x.started, has_vertical(u, p)),
+        **rest_test(x, u, p),
+        samples=x.samples + x.started,
+        dV=x.dV + R @ u.accel * T,  # (2)
+        S=x.S + R_bar * dt,  # (2)
+        theta=x.theta + w * dt,  # (2)
+        T=x.T + T,  # (2)
+        blind=x.blind + blind * dt,  # (3)
+    )
+
+
+def rate(x: SimpleNamespace, u: SimpleNamespace) -> Any:
+    """w: angular velocity (rad/s) as far as the errors of the gyroscope are known."""
+    without_bias = u.gyro - x.b
+    return without_bias + x.D @ without_bias  # (1)
+
+
+def rest_test(x: SimpleNamespace, u: SimpleNamespace, p: SimpleNamespace) -> Expressions:
+    """Low-passed readings and the number of samples for which the sensor has been still."""
+    keep = p.rr_l / (p.rr_l + p.sample_period)
+    gyro_lp = u.gyro + keep * (x.gyro_lp - u.gyro)
+    accel_lp = u.accel + keep * (x.accel_lp - u.accel)
+    missing = ca.fmax(u.gyro_missing, u.accel_missing)
+    steady = ca.logic_and(
+        ca.sumsqr(u.gyro - gyro_lp) < p.rr_dg**2,
+        ca.sumsqr(u.accel - accel_lp) < p.rr_da**2,
+    )
+    still = ca.logic_and(ca.logic_and(steady, ca.mmax(ca.fabs(gyro_lp)) < p.rr_b), ca.logic_not(missing))
+    return dict(gyro_lp=gyro_lp, accel_lp=accel_lp, still_samples=ca.if_else(still, x.still_samples + 1, 0))
+
+
+def at_rest(x: SimpleNamespace, p: SimpleNamespace) -> Any:
+    """1 where the sensor has been still long enough."""
+    return x.still_samples * p.sample_period >= p.rr_t
+
+
+def block_is_full(x: SimpleNamespace, u: SimpleNamespace, p: SimpleNamespace) -> Any:
+    """1 after m samples, where the slow step is due."""
+    return x.samples >= ca.fmax(1, ca.floor(p.h / p.sample_period + 0.5))
+
+
+def slow_step(x: SimpleNamespace, u: SimpleNamespace, p: SimpleNamespace) -> Expressions:
+    """The end of a block: prediction of the errors, measurements, correction."""
+    H, resting = x.samples * p.sample_period, at_rest(x, p)
+    v_N = x.v + x.dV - p.g * UP * x.T  # (4)
+    P = predicted(full(x.P), x, H, p)
+    error = ca.SX.zeros(N_ERRORS)
+    moving_variance = p.s_v**2 * root(ca.fmax(x.speed2, p.v2**2)) / p.k_v  # (7)
+    for i, v_i in zip(range(N_ERRORS)[V], ca.vertsplit(v_N), strict=True):
+        error, P = update(error, P, [i], -v_i, ca.if_else(resting, p.rr_v**2, moving_variance) / H)  # (7), (8)
+    for i, b_i in zip(range(N_ERRORS)[B], ca.vertsplit(x.gyro_lp - x.b), strict=True):
+        error, P = update(error, P, [i], b_i, p.rr_g**2 / H, accepted=resting)  # (8)
+    v_N = v_N + error[V]
+    return dict(
+        q=unit(multiply(quaternion_from_rotation_vector(error[PSI]), x.q)),  # (9)
+        v=v_N,
+        b=bounded(x.b + error[B], LARGEST_BIAS),  # (9)
+        D=bounded(x.D + ca.reshape(error[D], 3, 3).T, LARGEST_GYRO_ERROR),  # (9)
+        P=upper_triangle(P),
+        speed2=x.speed2 + H / (p.t_l + H) * (ca.sumsqr(v_N) / 3 - x.speed2),  # (9)
+        **empty_block(),
+    )
+
+
+def predicted(P: Any, x: SimpleNamespace, H: Any, p: SimpleNamespace) -> Any:
+    """Covariance (18, 18) at the end of a block, from that at its beginning."""
+    R = matrix_from_quaternion(x.q)
+    Phi = ca.SX.eye(N_ERRORS)
+    Phi[PSI, B], Phi[PSI, D], Phi[V, PSI] = -x.S, ca.kron(x.S, x.theta.T / H), -skew(x.dV)  # (5)
+    P = ca.SX(Phi @ P @ Phi.T)
+    W = p.k_g**2 / H * x.theta @ x.theta.T + p.s_s**2 * ca.diag(x.blind)  # (6)
+    P[PSI, PSI] += p.s_g**2 * H * I3 + R @ W @ R.T  # (6)
+    P[V, V] += (p.s_a**2 * H + p.s_m**2 * (H - x.T)) * I3  # (6)
+    P[B, B] += p.s_b**2 * H * I3  # (6)
+    for i in (*range(N_ERRORS)[PSI], *range(N_ERRORS)[B]):
+        shrink = ca.sqrt(LARGEST_VARIANCE / ca.fmax(LARGEST_VARIANCE, P[i, i]))
+        P[i, :] *= shrink
+        P[:, i] *= shrink
+    return ca.triu2symm(ca.triu(P))
+
+
+def upper_triangle(P: Any) -> Any:
+    """Upper triangle of a matrix, flat, row by row."""
+    return ca.vertcat(*(P[i, j] for i in range(N_ERRORS) for j in range(i, N_ERRORS)))
+
+
+def full(triangle: Any) -> Any:
+    """Symmetric matrix of an upper triangle."""
+    P, elements = ca.SX(N_ERRORS, N_ERRORS), iter(ca.vertsplit(triangle))
+    for i in range(N_ERRORS):
+        for j in range(i, N_ERRORS):
+            P[i, j] = P[j, i] = next(elements)
+    return P
+
+
+def bounded(values: Any, largest: float) -> Any:
+    """Each value within +-largest."""
+    return ca.fmin(ca.fmax(values, -largest), largest)
+
+
+def output(x: SimpleNamespace, u: SimpleNamespace, p: SimpleNamespace) -> Expressions:
+    """Outputs of one sample."""
+    ahead = unit(ca.vertcat(1, rate(x, u) * p.latency / 2))  # to second order in the turn
+    q = multiply(x.q, ahead)
+    roll, pitch, yaw = euler_from_quaternion(q)
+    P = full(x.P)
+    return dict(
+        roll=roll,
+        pitch=pitch,
+        yaw=yaw,
+        q_NS=q,
+        vertical=rotate_back(q, UP),
+        external_acceleration=ca.if_else(u.accel_missing, 0, u.accel - p.g * rotate_back(x.q, UP)),
+        tilt_std=root(P[0, 0] + P[1, 1]),
+        gyro_bias=x.b,
+        stationary=at_rest(x, p),
+        velocity_intensity=root(x.speed2),
+        status=v.Status.GYRO_MISSING * u.gyro_missing
+        + v.Status.ACCEL_MISSING * u.accel_missing
+        + v.Status.NOT_INITIALISED * (1 - x.started),
+        velocity=x.v,
+        gyro_error=x.D,
+        tilt_covariance=P[:2, :2],
+    )
+
+
+BLOCK = SampledBlock(
+    name="plumb",
+    summary="Attitude from a 6-axis IMU for any acceleration: error-state Kalman filter that takes velocity for noise",
+    doc="""Estimates roll and pitch, yaw relative to the start, the external acceleration, and the gyroscope's bias,
+scale and cross-axis errors. One set of parameters serves hand-held, body-worn and tool-mounted sensors, from slow to
+violent motion, with or without rest; only gyro_range and g follow the sensor and the place. tilt_std follows the
+motion. Start it at rest if you can: it then knows the attitude at once and the bias within ten seconds. In the middle
+of a motion it needs some ten seconds, in a violent motion longer. Do not use it where velocity changes slowly and for
+long - a car in a roundabout, an aircraft in a turn, a centrifuge: there velocity is not noise, and the horizon tilts. A
+turn slower than rr_b that lasts longer than rr_t is taken for rest, and its rate for bias.
+Nothing observes yaw: it drifts.""",
+    reference="Model of velocity: T. Rizun, Journal of Navigation 61, 2008, doi:10.1017/S0373463308004736",
+    inputs=(v.GYRO, v.ACCEL),
+    outputs=(
+        v.ROLL,
+        v.PITCH,
+        v.YAW,
+        v.Q_NS,
+        v.VERTICAL,
+        v.EXTERNAL_ACCELERATION,
+        v.TILT_STD,
+        Signal("gyro_bias", "rad/s", "Bias of the gyroscope, sensor frame", -1, 1, (3,), nominal=0.01),
+        Signal("stationary", "1", "1 at rest, else 0", 0, 1),
+        Signal("velocity_intensity", "m/s", "Root mean square of the velocity on one axis, low-passed", 0, 1e9),
+        v.STATUS,
+    ),
+    locals=(
+        Signal("velocity", "m/s", "Velocity in N, as far as it is not taken for noise", -1e9, 1e9, (3,)),
+        Signal("gyro_error", "1", "Scale and cross-axis errors of the gyroscope", -1, 1, (3, 3), nominal=1e-3),
+        Signal("tilt_covariance", "rad2", "Covariance of the tilt about x and y of N", -2, 2, (2, 2), nominal=1e-4),
+    ),
+    own_parameters=(
+        real("g", "m/s2", 9.81, (1, 100), "Magnitude of gravity at the place of use"),
+        real(
+            "gyro_range",
+            "rad/s",
+            radians(2000),
+            (1e-3, 1e3),
+            "Full scale of the gyroscope; more than 95 % count as saturated",
+        ),
+        real(
+            "latency", "s", 0.0, (0, 0.2), "Attitude outputs are predicted this far ahead of the sample", tunable=True
+        ),
+        real("h", "s", 0.05, (1e-6, 10), "Length of a block: time between corrections"),
+        real("s_g", "rad/s/sqrt(Hz)", 0.0015, (0, 10), "Noise density of the gyroscope, with vibration"),
+        real("k_g", "1/sqrt(Hz)", 3e-4, (0, 1), "Noise density of the gyroscope in proportion to the rate"),
+        real("s_s", "rad/s/sqrt(Hz)", 0.2, (0, 100), "Noise density of a gyroscope axis that is saturated or missing"),
+        real(
+            "s_b", "rad/s2/sqrt(Hz)", 2e-4, (0, 1), "Random walk of the gyroscope bias; larger follows warm-up faster"
+        ),
+        real(
+            "s_a",
+            "m/s2/sqrt(Hz)",
+            0.03,
+            (1e-3, 100),
+            "Noise density of the accelerometer; below 0.01 the filter trusts itself too much",
+        ),
+        real("s_m", "m/s2/sqrt(Hz)", 1.0, (0, 1e3), "Density of the acceleration while the accelerometer is missing"),
+        real(
+            "s_v",
+            "m/s/sqrt(Hz)",
+            0.3,
+            (1e-3, 1e3),
+            "Density of the velocity in motion; larger trusts the gyroscope more",
+        ),
+        real("k_v", "m/s", 0.5, (1e-3, 1e3), "Velocity, root mean square of one axis, at which the density is s_v"),
+        real("v2", "m/s", 0.05, (1e-6, 1e3), "Velocity, root mean square of one axis, of the gentlest motion"),
+        real("t_l", "s", 3.0, (0, 1e3), "Time constant at which the density follows the motion"),
+        real("rr_v", "m/s/sqrt(Hz)", 0.003, (1e-6, 1e3), "Density of the velocity at rest"),
+        real(
+            "rr_g",
+            "rad/s/sqrt(Hz)",
+            0.01,
+            (1e-6, 1e3),
+            "Density of the low-passed gyroscope at rest, as a measurement of its bias",
+        ),
+        real("rr_l", "s", 0.5, (0, 1e3), "Rest: time constant of the low-pass"),
+        real("rr_dg", "rad/s", radians(2.8), (0, 1e3), "Rest: largest distance of the gyroscope from its low-pass"),
+        real("rr_da", "m/s2", 0.8, (0, 1e3), "Rest: largest distance of the accelerometer from its low-pass"),
+        real("rr_b", "rad/s", radians(2), (0, 1e3), "Rest: largest low-passed gyroscope on each axis"),
+        real("rr_t", "s", 0.1, (0, 1e3), "Rest: how long it must last to count"),
+        real("P0_psi", "rad", 0.2, (0, 1), "Standard deviation of the attitude at the start, each axis"),
+        real("P0_v", "m/s", 0.5, (0, 1e3), "Standard deviation of the velocity at the start, each axis"),
+        real("P0_b", "rad/s", 0.01, (0, 1), "Standard deviation of the gyroscope bias at the start, each axis"),
+        real("P0_D", "1", 0.0025, (0, 0.1), "Standard deviation of the scale and cross-axis errors"),
+    ),
+    state=(
+        State("q", (4,)),
+        State("started"),
+        State("gyro_lp", (3,)),
+        State("accel_lp", (3,)),
+        State("still_samples"),
+        State("samples"),
+        State("dV", (3,)),
+        State("T"),
+        State("S", (3, 3)),
+        State("theta", (3,)),
+        State("blind", (3,)),
+        # Only the slow step changes these.
+        State("v", (3,)),
+        State("b", (3,)),
+        State("D", (3, 3)),
+        State("P", (N_ERRORS * (N_ERRORS + 1) // 2,)),
+        State("speed2"),
+    ),
+    initial=initial,
+    step=step,
+    slow_due=block_is_full,
+    slow_step=slow_step,
+    output=output,
+    period=0.01,
+)

@@ -1,0 +1,147 @@
+"""Build native FMUs: generated C, the wrapper of fmu_src/c and its binaries in one archive that needs nothing else.
+
+Binaries are kept in the user's cache by everything that they depend on: sources, compiler and flags.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import shutil
+import tempfile
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor, as_completed
+from pathlib import Path
+from xml.etree.ElementTree import indent, tostring
+
+import fmpy
+from platformdirs import user_cache_path
+
+from .. import __version__
+from ..block import Block
+from ..files import atomic_write
+from ..locations import fmu_src_folder
+from ..registry import BLOCKS
+from ..series import series
+from ..signals import DeclarationError
+from .build import BuildError, source_digest, write_archive
+from .codegen import generate
+from .compilers import PLATFORMS, Platform, commands, compile_library, identity, own_platform
+from .documentation import documentation_page, icon
+from .model_description import NATIVE_SOURCE, model_description
+
+_SERIES = Path(__file__).parents[1] / "series.py"
+_HEADERS = ("fmi2Functions.h", "fmi2FunctionTypes.h", "fmi2TypesPlatform.h")
+
+
+def build_native(
+    name: str,
+    folder: Path,
+    platforms: Sequence[str] | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> Path:
+    """Write the native FMU of a block and return its path in ``folder``: name.fmu.
+
+    name: of a registered block, or of several in series, as imu+lee2012, which makes imu_lee2012.fmu. platforms: names
+    from PLATFORMS, compiled in parallel; by default the platform at hand. progress: called with the number of binaries
+    that are ready and that of all. Raises BuildError for an unknown name or platform, blocks that do not fit together,
+    a compiler that is missing or fails, or a folder that cannot be written.
+    """
+    block = block_called(name)
+    wanted = [_platform(given) for given in dict.fromkeys(platforms or [own_platform()])]
+    target = folder / f"{block.name}.fmu"
+    try:
+        code = sources(block)
+        binaries = _binaries(block.name, code, wanted, progress)
+        folder.mkdir(parents=True, exist_ok=True)
+        with atomic_write(target) as temporary:
+            write_archive(_members(block, code, wanted) | binaries, temporary)
+    except OSError as error:
+        raise BuildError(f"cannot write {target}: {error.strerror or error}") from error
+    return target
+
+
+def cached_native_fmu(name: str) -> Path:
+    """Path of the native FMU of a block, named as for ``build_native``, for the platform at hand; in the user's cache.
+
+    Built when its source or the compiler has changed. Raises BuildError as ``build_native`` does.
+    """
+    digest = hashlib.sha256(f"{source_digest([*_wrapper(), _SERIES])} {identity()}".encode()).hexdigest()
+    folder = user_cache_path("imufmu") / f"{__version__}-native-{digest[:16]}"
+    path = folder / f"{block_called(name).name}.fmu"
+    return path if path.is_file() else build_native(name, folder)
+
+
+def block_called(name: str) -> Block:
+    """The registered block of this name, or the series of blocks joined by +. Raises BuildError."""
+    parts = name.split("+")
+    unknown = [part for part in parts if part not in BLOCKS]
+    if unknown:
+        raise BuildError(f"no block is called {unknown[0]!r}; there is {', '.join(BLOCKS)}")
+    try:
+        return BLOCKS[name] if len(parts) == 1 else series(*(BLOCKS[part] for part in parts))
+    except DeclarationError as error:
+        raise BuildError(str(error)) from error
+
+
+def sources(block: Block) -> dict[str, bytes]:
+    """C source by file name, complete: the generated files, the wrapper, and the headers of the FMI standard."""
+    headers = [Path(fmpy.__file__).parent / "c-code" / header for header in _HEADERS]
+    written = {path.name: path.read_bytes() for path in (*_wrapper(), *headers)}
+    return written | {file: text.encode() for file, text in generate(block).items()}
+
+
+def _wrapper() -> list[Path]:
+    return sorted((fmu_src_folder() / "c").glob("*.[ch]"))
+
+
+def _platform(name: str) -> Platform:
+    if name not in PLATFORMS:
+        raise BuildError(f"no platform is called {name!r}; there is {', '.join(PLATFORMS)}")
+    return PLATFORMS[name]
+
+
+def _members(block: Block, code: dict[str, bytes], platforms: Sequence[Platform]) -> dict[str, bytes]:
+    """Everything but the binaries, by its place in the archive."""
+    description = model_description(block, native=True)
+    indent(description)
+    page = documentation_page(block, [platform.title for platform in platforms])
+    return {
+        "modelDescription.xml": tostring(description, encoding="utf-8", xml_declaration=True),
+        "documentation/index.html": page.encode(),
+        "model.png": icon(block.name),
+    } | {f"sources/{file}": content for file, content in code.items()}
+
+
+def _binaries(
+    name: str, code: dict[str, bytes], platforms: Sequence[Platform], progress: Callable[[int, int], None] | None
+) -> dict[str, bytes]:
+    """Libraries of all platforms, by their place in the archive."""
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        running = {pool.submit(_library, name, code, platform): platform for platform in platforms}
+        done = {}
+        for future in as_completed(running):
+            platform = running[future]
+            done[f"binaries/{platform.folder}/{name}{platform.suffix}"] = future.result()
+            if progress:
+                progress(len(done), len(platforms))
+    return done
+
+
+def _library(name: str, code: dict[str, bytes], platform: Platform) -> bytes:
+    """The library, from the cache or compiled into it. Its sources stay beside it, whether they compile or not."""
+    file = f"{name}{platform.suffix}"
+    calls = commands(platform, file)
+    digest = hashlib.sha256(repr((sorted(code.items()), calls, identity())).encode())
+    folder = user_cache_path("imufmu") / "native" / digest.hexdigest()[:16]
+    kept = folder / file
+    if not kept.is_file():
+        (folder / "sources").mkdir(parents=True, exist_ok=True)
+        for source, content in code.items():
+            (folder / "sources" / source).write_bytes(content)
+        with tempfile.TemporaryDirectory(prefix="imufmu_build_") as scratch:
+            made = Path(scratch) / file
+            compile_library(calls, folder / "sources" / NATIVE_SOURCE, made)
+            with atomic_write(kept) as temporary:
+                shutil.copyfile(made, temporary)
+    return kept.read_bytes()

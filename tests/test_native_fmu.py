@@ -1,0 +1,329 @@
+"""Claims about native FMUs at run time beyond what every FMU keeps: the FMI 2.0 protocol to the letter."""
+
+from __future__ import annotations
+
+import ctypes
+import math
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any
+
+import fmu
+import numpy as np
+import pytest
+from fmpy import fmi2
+from fmpy.fmi1 import FMICallException
+
+from imufmu.block import SampledBlock
+from imufmu.fmi.model_description import LOG_CATEGORIES, guid
+from imufmu.fmi.native import block_called
+from imufmu.registry import BLOCKS
+
+NAMES = list(BLOCKS)
+WARNING, ERROR = 1, 3
+
+
+def native(name: str = "lee2012", **options: Any) -> fmu.Fmu:
+    return fmu.Fmu(name, kind="native", **options)
+
+
+def refusal(instance: fmu.Fmu, call: Callable[[], Any]) -> str:
+    """The one message of a call that is to return fmi2Error."""
+    before = len(instance.log)
+    with pytest.raises(FMICallException) as raised:
+        call()
+    assert raised.value.status == ERROR
+    messages = instance.log[before:]
+    assert [status for status, _ in messages] == [ERROR]
+    return messages[0][1]
+
+
+# The order of calls
+
+
+def enter(instance: fmu.Fmu) -> None:
+    instance.slave.enterInitializationMode()
+
+
+def leave(instance: fmu.Fmu) -> None:
+    instance.slave.exitInitializationMode()
+
+
+def terminate(instance: fmu.Fmu) -> None:
+    instance.slave.terminate()
+
+
+CALLS: dict[str, Callable[[fmu.Fmu], Any]] = {
+    "fmi2SetupExperiment": lambda i: i.slave.setupExperiment(startTime=0.0),
+    "fmi2EnterInitializationMode": enter,
+    "fmi2ExitInitializationMode": leave,
+    "fmi2DoStep": lambda i: i.step(0.0, 0.01),
+    "fmi2GetReal": lambda i: i.get("roll"),
+    "fmi2GetInteger": lambda i: i.slave.getInteger([i.variables["mode"].valueReference]),
+    "fmi2SetReal": lambda i: i.set({"gyro[1]": 0.1}),
+    "fmi2SetInteger": lambda i: i.set({"mode": 2}),
+    "fmi2GetDirectionalDerivative": lambda i: derivative(i, "roll", "accel[2]"),
+    "fmi2Terminate": terminate,
+}
+SETS = {"fmi2SetReal", "fmi2SetInteger"}
+GETS = {"fmi2GetReal", "fmi2GetInteger", "fmi2GetDirectionalDerivative"}
+PHASES: dict[str, tuple[list[Callable[[fmu.Fmu], None]], set[str]]] = {
+    "before initialisation": ([], {"fmi2SetupExperiment", "fmi2EnterInitializationMode"} | SETS),
+    "during initialisation": ([enter], {"fmi2ExitInitializationMode"} | SETS | GETS),
+    "once the simulation runs": ([enter, leave], {"fmi2DoStep", "fmi2Terminate"} | SETS | GETS),
+    "after fmi2Terminate": ([enter, leave, terminate], GETS),
+}
+
+
+@pytest.mark.parametrize("function", CALLS)
+@pytest.mark.parametrize("phase", PHASES)
+def test_a_function_works_in_its_phases_and_is_refused_in_the_others(phase: str, function: str) -> None:
+    way, allowed = PHASES[phase]
+    instance = native()
+    for call in way:
+        call(instance)
+    if function in allowed:
+        CALLS[function](instance)
+        assert instance.log == []
+    else:
+        assert refusal(instance, lambda: CALLS[function](instance)) == f"lee2012: {function} cannot be called {phase}"
+    instance.slave.reset()  # always a way out
+    instance.initialise().close()
+
+
+def test_a_start_time_that_is_no_time_is_refused() -> None:
+    instance = native()
+    assert "start time nan" in refusal(instance, lambda: instance.slave.setupExperiment(startTime=math.nan))
+    instance.slave.freeInstance()
+
+
+def test_a_wrong_parameter_can_be_corrected_before_initialisation_ends() -> None:
+    instance = native()
+    assert "c_a = 2 is outside [0, 1]" in refusal(instance, lambda: instance.initialise({"c_a": 2.0}))
+    instance.set({"c_a": 0.2})
+    leave(instance)
+    instance.step(0.0, 0.01)
+    instance.close()
+
+
+def test_every_wrong_parameter_is_named_in_one_message() -> None:
+    instance = native()
+    message = refusal(instance, lambda: instance.initialise({"c_a": math.nan, "mode": 4, "P0": -1.0}))
+    assert message.startswith("lee2012: mode = 4 is outside [1, 3]; c_a = nan is outside [0, 1]; P0 = -1 is outside")
+    instance.slave.freeInstance()
+
+
+@pytest.mark.parametrize("wrong", [{"guid": "{00000000-0000-0000-0000-000000000000}"}, {"instance_name": ""}])
+def test_an_instance_needs_the_guid_of_its_description_and_a_name(wrong: dict[str, str]) -> None:
+    with pytest.raises(Exception, match="Failed to instantiate"):
+        native(**wrong)
+
+
+# Variables
+
+
+def test_a_call_sets_all_its_values_or_none() -> None:
+    instance = native().initialise()
+    references = [instance.variables[name].valueReference for name in ("c_a", "gyro[1]", "g")]
+    message = refusal(instance, lambda: instance.slave.setReal(references, [0.7, 5.0, 9.0]))
+    assert message == "lee2012: g is fixed once the simulation runs; it keeps 9.8"
+    assert instance.get("c_a", "gyro[1]") == [0.1, 0.0]
+    instance.close()
+
+
+def test_variables_are_refused_by_name_in_the_functions_of_another_type() -> None:
+    instance = native().initialise()
+    mode, roll = (instance.variables[name].valueReference for name in ("mode", "roll"))
+    assert "mode is Integer, not Real" in refusal(instance, lambda: instance.slave.getReal([mode]))
+    assert "mode is Integer, not Boolean" in refusal(instance, lambda: instance.slave.setBoolean([mode], [True]))
+    assert "roll is Real, not Integer" in refusal(instance, lambda: instance.slave.setInteger([roll], [1]))
+    assert "no variable has value reference 100000" in refusal(instance, lambda: instance.slave.getReal([100_000]))
+    assert "roll is calculated" in refusal(instance, lambda: instance.set({"roll": 1.0}))
+    instance.close()
+
+
+def test_what_is_not_there_is_refused_and_says_so() -> None:
+    instance = native().initialise()
+    slave, gyro = instance.slave, [instance.variables["gyro[1]"].valueReference]
+    assert "no string variables" in refusal(instance, lambda: slave.getString(gyro))
+    assert "no string variables" in refusal(instance, lambda: slave.setString(gyro, ["a"]))
+    assert "canInterpolateInputs is false" in refusal(instance, lambda: slave.setRealInputDerivatives(gyro, [1], [1.0]))
+    assert "maxOutputDerivativeOrder is 0" in refusal(instance, lambda: slave.getRealOutputDerivatives(gyro, [1]))
+    assert "no step is pending" in refusal(instance, slave.cancelStep)
+    assert slave.getString([]) == []
+    instance.close()
+
+
+# Logging
+
+
+def test_logging_off_leaves_the_refusals() -> None:
+    instance = native(logging=False).initialise()
+    instance.set({"gyro[1]": math.nan})
+    instance.step(0.0, 0.01)
+    assert instance.log == []
+    refusal(instance, lambda: instance.step(0.01, -1.0))
+    instance.close()
+
+
+@pytest.mark.parametrize(
+    ("on", "categories", "logged"),
+    [
+        (True, [], {WARNING, ERROR}),
+        (True, ["logAll"], {WARNING, ERROR}),
+        (True, ["logStatusWarning"], {WARNING}),
+        (True, ["logStatusError", "logStatusFatal"], {ERROR}),
+        (False, ["logStatusWarning"], {ERROR}),
+        (False, [], set()),
+    ],
+)
+def test_categories_choose_what_is_logged(on: bool, categories: list[str], logged: set[int]) -> None:
+    instance = native().initialise()
+    instance.slave.setDebugLogging(on, categories)
+    instance.set({"gyro[1]": math.nan})
+    instance.step(0.0, 0.01)
+    with pytest.raises(FMICallException):
+        instance.step(0.01, -1.0)
+    assert {status for status, _ in instance.log} == logged
+    instance.close()
+
+
+def test_categories_are_those_of_the_description() -> None:
+    instance = native()
+    instance.slave.setDebugLogging(True, list(LOG_CATEGORIES))
+    message = refusal(instance, lambda: instance.slave.setDebugLogging(True, ["logEvents"]))
+    assert all(category in message for category in LOG_CATEGORIES)
+    instance.slave.freeInstance()
+
+
+def test_the_step_that_meets_missing_inputs_first_returns_a_warning() -> None:
+    instance = native().initialise()
+    statuses = []
+    for k, value in enumerate([0.0, math.nan, math.nan, 0.0, math.inf]):
+        instance.set({"gyro[1]": value})
+        statuses.append(do_step(instance, 0.01 * k, 0.01))
+    assert statuses == [fmi2.fmi2OK, fmi2.fmi2Warning, fmi2.fmi2OK, fmi2.fmi2OK, fmi2.fmi2Warning]
+    instance.close()
+
+
+def do_step(instance: fmu.Fmu, t: float, h: float) -> int:
+    """Status of the plain C function, which FMPy's wrapper keeps to itself."""
+    function = instance.slave.dll.fmi2DoStep
+    function.argtypes = [ctypes.c_void_p, ctypes.c_double, ctypes.c_double, ctypes.c_int]
+    return int(function(instance.slave.component, t, h, 1))
+
+
+# State
+
+
+def test_a_state_of_another_block_or_length_is_refused_and_changes_nothing() -> None:
+    instance, other = native().initialise(), native("imu").initialise()
+    instance.step(0.0, 0.05)
+    before = instance.reals()
+    foreign = fmu.serialised(other)
+    own = fmu.serialised(instance)
+    wrong_phase = own.replace((4).to_bytes(8, "little"), (77).to_bytes(8, "little"))
+    other_build = own.replace(instance.model.guid.encode(), guid(BLOCKS["imu"], native=True).encode())
+    assert own not in (wrong_phase, other_build)
+    for saved in (foreign, own[:-8], own + b"\0", other_build, wrong_phase):
+        refusal(instance, lambda saved=saved: fmu.restore(instance, saved))
+        assert instance.reals() == before
+    instance.close()
+    other.close()
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_state_kept_in_memory_returns_bit_for_bit_also_to_another_phase(name: str) -> None:
+    instance = native(name)
+    fresh = instance.slave.getFMUstate()
+    instance.initialise(start_time=1.0)
+    instance.step(1.0, 0.1)
+    running, expected = instance.slave.getFMUstate(), instance.reals()
+    instance.step(1.1, 0.3)
+    instance.slave.setFMUstate(running)
+    assert instance.reals() == expected
+    instance.slave.setFMUstate(fresh)
+    instance.initialise(start_time=1.0)
+    instance.step(1.0, 0.1)
+    assert instance.reals() == expected
+    for state in (fresh, running):
+        instance.slave.freeFMUstate(state)
+    instance.close()
+
+
+# Derivatives
+
+
+def derivative(instance: fmu.Fmu, output: str, with_respect_to: str) -> float:
+    unknown, known = instance.variables[output].valueReference, instance.variables[with_respect_to].valueReference
+    return float(instance.slave.getDirectionalDerivative([unknown], [known], [1.0])[0])
+
+
+@pytest.mark.parametrize("steps", [0, 1, 5])
+@pytest.mark.parametrize("name", [*(name for name, block in BLOCKS.items() if block.inputs), "imu+lee2012"])
+def test_directional_derivatives_are_those_of_repeating_the_last_step_with_other_inputs(name: str, steps: int) -> None:
+    """Of every output along a random direction of inputs, against the central difference."""
+    rng, block = np.random.default_rng(9), block_called(name)
+    instance = native(name)
+    by_causality = {c: [v for v in instance.model.modelVariables if v.causality == c] for c in ("input", "output")}
+    inputs, outputs = ([v.valueReference for v in by_causality[c]] for c in ("input", "output"))
+    start = block.start_vector(block.inputs) + rng.uniform(0.1, 0.5, len(inputs))
+    direction = rng.uniform(-1.0, 1.0, len(inputs))
+
+    # A sampled block answers for its last sample, a plant for the inputs at its time: set after the last step.
+    changes_before = max(steps - 1, 0) if isinstance(block, SampledBlock) else steps
+
+    def after(change: float) -> np.ndarray:
+        """Outputs after all steps, the last inputs changed; without a step, those of the initialisation mode."""
+        instance.slave.reset()
+        enter(instance)
+        instance.slave.setReal(inputs, list(start))
+        if steps:
+            leave(instance)
+        for k in range(steps + 1):
+            if k == changes_before:
+                instance.slave.setReal(inputs, list(start + change * direction))
+            if k < steps:
+                instance.step(0.01 * k, 0.01)
+        return np.array(instance.slave.getReal(outputs))
+
+    eps = 1e-5
+    difference = (after(eps) - after(-eps)) / (2 * eps)
+    after(0.0)
+    actual = np.array(instance.slave.getDirectionalDerivative(outputs, inputs, list(direction)))
+    # Rounding of 1e-16 / eps, and a truncation of eps^2: both 1e-10, times what outputs of the size 100 amplify.
+    np.testing.assert_allclose(actual, difference, rtol=1e-6, atol=1e-6)
+    assert steps < 2 or np.any(actual != 0)  # a first sample may depend on parameters alone
+    instance.slave.freeInstance()
+
+
+def test_derivatives_are_of_outputs_with_respect_to_inputs_only() -> None:
+    instance = native().initialise()
+    assert "innovation[1] is not an output" in refusal(
+        instance, lambda: derivative(instance, "innovation[1]", "gyro[1]")
+    )
+    assert "g is not an input" in refusal(instance, lambda: derivative(instance, "roll", "g"))
+    assert derivative(instance, "sample_time", "gyro[1]") == 0.0
+    instance.close()
+
+
+# Threads
+
+
+@pytest.mark.parametrize("name", ["lee2012", "imu", "double_pendulum"])
+def test_instances_in_several_threads_at_once_give_what_each_gives_alone(name: str) -> None:
+    """FMPy lets go of Python's lock during a call, so long steps do overlap."""
+
+    def outcome(index: int) -> list[float]:
+        instance = native(name, instance_name=f"instance{index}").initialise()
+        inputs = [v.name for v in instance.model.modelVariables if v.causality == "input"]
+        for k in range(20):
+            instance.set({i: math.sin(index + j + k) for j, i in enumerate(inputs)})
+            instance.step(10.0 * k, 10.0)
+        values = instance.reals()
+        instance.close()
+        return values
+
+    alone = [outcome(index) for index in range(4)]
+    with ThreadPoolExecutor(4) as pool:
+        assert list(pool.map(outcome, range(4))) == alone

@@ -1,0 +1,104 @@
+"""Native FMUs in hosts without Python: a C program on this system, under wine and under qemu."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+import sys
+import zipfile
+from collections.abc import Sequence
+from pathlib import Path
+
+import fmpy
+import numpy as np
+import pytest
+
+from imufmu.block import SampledBlock
+from imufmu.fmi.compilers import PLATFORMS, has_ziglang, own_platform
+from imufmu.fmi.model_description import guid
+from imufmu.fmi.native import block_called, build_native
+from imufmu.instance import instantiate
+from imufmu.registry import BLOCKS
+
+STEPS, H = 50, 0.01
+HOST = Path(__file__).with_name("host.c")
+HEADERS = Path(fmpy.__file__).parent / "c-code"
+ZIG = has_ziglang()
+ARM_SYSTEM = Path("/usr/aarch64-linux-gnu")  # where Debian's libc6-arm64-cross puts the C library
+
+
+def in_process(name: str) -> np.ndarray:
+    """What the host is to print: every output, (STEPS, number of outputs)."""
+    instance = instantiate(block_called(name))
+    instance.initialise(0.0)
+    rows = []
+    for k in range(STEPS):
+        instance.u[:] = [((i + 3 * k) % 7 - 3) / 4 for i in range(len(instance.u))]
+        instance.do_step(k * H, H)
+        rows.append(instance.y.copy())
+    return np.array(rows)
+
+
+def in_host(name: str, runner: Sequence[str], host: Path, folder: Path, platform: str) -> np.ndarray:
+    """What it prints, with an empty environment."""
+    fmu, block = build_native(name, folder, [platform]), block_called(name)
+    library = f"binaries/{platform}/{block.name}{PLATFORMS[platform].suffix}"
+    with zipfile.ZipFile(fmu) as archive:
+        archive.extract(library, folder)
+    sizes = [sum(s.size for s in signals) for signals in (block.inputs, block.parameters, block.reported)]
+    arguments = [guid(block, native=True), str(STEPS), str(H), str(sizes[0]), str(sizes[0] + sizes[1]), str(sizes[2])]
+    run = subprocess.run(
+        [*runner, str(host), str(folder / library), *arguments], capture_output=True, text=True, env={}
+    )
+    assert run.returncode == 0, run.stderr
+    return np.array([[float(value) for value in line.split()] for line in run.stdout.splitlines()])
+
+
+def compile_host(folder: Path, compiler: Sequence[str], suffix: str = "") -> Path:
+    host = folder / f"host{suffix}"
+    libraries = [] if suffix else ["-ldl"]
+    subprocess.run([*compiler, "-std=c99", f"-I{HEADERS}", str(HOST), "-o", str(host), *libraries], check=True)
+    return host
+
+
+def zig(target: str) -> list[str]:
+    return [sys.executable, "-m", "ziglang", "cc", "-target", target]
+
+
+@pytest.fixture(scope="module")
+def host(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    compiler = zig("native") if ZIG and not shutil.which("cc") else ["cc"]
+    return compile_host(tmp_path_factory.mktemp("host"), compiler)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="the host is built for POSIX systems here")
+@pytest.mark.parametrize("name", [*BLOCKS, "imu+lee2012", "pendulum+imu+lee2012"])
+def test_a_c_program_gets_the_numbers_of_the_run_in_process(name: str, host: Path, tmp_path: Path) -> None:
+    """Bit for bit: the same operations in the same order, the same C library."""
+    assert np.array_equal(in_host(name, [], host, tmp_path, own_platform()), in_process(name))
+
+
+def close(name: str, actual: np.ndarray) -> None:
+    """Another C library rounds sin, log and their like differently in the last digit."""
+    scale = [max(1.0, s.nominal) for s in BLOCKS[name].reported for _ in range(s.size)]
+    assert np.max(np.abs(actual - in_process(name)) / scale) < 1e-12
+
+
+PORTABLE = [name for name, block in BLOCKS.items() if isinstance(block, SampledBlock)] + ["pendulum"]
+
+
+@pytest.mark.skipif(not (ZIG and shutil.which("wine")), reason="needs ziglang and wine")
+@pytest.mark.parametrize("name", PORTABLE)
+def test_the_windows_build_gets_the_same_numbers_under_wine(name: str, tmp_path: Path) -> None:
+    program = compile_host(tmp_path, zig("x86_64-windows-gnu"), ".exe")
+    close(name, in_host(name, ["wine"], program, tmp_path, "win64"))
+
+
+@pytest.mark.skipif(
+    not (ZIG and shutil.which("qemu-aarch64") and ARM_SYSTEM.is_dir()),
+    reason="needs ziglang, qemu-aarch64 and the C library of 64-bit ARM",
+)
+@pytest.mark.parametrize("name", PORTABLE)
+def test_the_arm_build_gets_the_same_numbers_under_qemu(name: str, tmp_path: Path) -> None:
+    program = compile_host(tmp_path, zig("aarch64-linux-gnu.2.17"))
+    close(name, in_host(name, ["qemu-aarch64", "-L", str(ARM_SYSTEM)], program, tmp_path, "aarch64-linux"))
