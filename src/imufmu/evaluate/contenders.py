@@ -87,7 +87,8 @@ def _blocks(names: Sequence[str]) -> list[SampledBlock]:
 
 
 def _contender(block: SampledBlock, parameters: Mapping[str, Any], name: str = "") -> Contender:
-    return Contender(name or block.name, partial(_estimate, block, parameters), parameters)
+    finds_bias = any(signal.name == "gyro_bias" for signal in block.outputs)
+    return Contender(name or block.name, partial(_estimate, block, parameters), parameters, finds_bias)
 
 
 def _estimate(

@@ -73,9 +73,11 @@ def _paper(verdict: Verdict) -> list[Section]:
     head = Section(verdict.title, f"{verdict.reference} ({_time(verdict)} s)".strip())
     if verdict.outcome is None:
         return [head]
-    rows = [
-        [c.name, value_text(c), limit_text(c), _percent(_margin(c)), _word(c.passed), c.reason] for c in verdict.checks
-    ]
+    rows = []
+    for check in verdict.checks:
+        numbers = (value_text(check), limit_text(check), _percent(_margin(check)))
+        unbroken = (text.replace(" ", "\N{NO-BREAK SPACE}") for text in numbers)
+        rows.append([check.name, *unbroken, _word(check.passed), check.reason])
     checks = Table(["criterion", "value", "limit", "margin", "result", "reason"], rows, words=True)
     sections = [head, *(replace(section, level=3) for section in verdict.outcome.sections)]
     if verdict.remarks:
