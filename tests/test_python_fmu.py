@@ -33,6 +33,8 @@ def test_a_script_may_simulate_again_and_again_with_fmpy(tmp_path):
         for k in range(3):
             result = fmpy.simulate_fmu(sys.argv[1], stop_time=0.1, start_values={"c_a": 0.1 * k})
         assert not __import__("pathlib").Path(sys.modules["imufmu"].__file__).exists()
+        from imufmu.cosim import simulate  # the rest of the installed imufmu can still be had
+        from imufmu.plants import pendulum
         print(len(result))
     """
     command = [sys.executable, "-c", program, str(cached_fmu("lee2012"))]

@@ -85,7 +85,8 @@ def validate(
     shares = context.Array("d", len(chosen))
     pool = ProcessPoolExecutor(min(len(chosen), os.cpu_count() or 1), context, _prepare_worker, (shares,))
     with pool, _workers_end_with_us():
-        runs = [pool.submit(_run, place, name, papers[name], quick, drawn) for place, name in enumerate(chosen)]
+        with _no_ctrl_c_for_what_starts_here():
+            runs = [pool.submit(_run, place, name, papers[name], quick, drawn) for place, name in enumerate(chosen)]
         pending = set(runs)
         while pending:
             pending = wait(pending, _BETWEEN_PROGRESS, FIRST_COMPLETED).not_done
@@ -112,10 +113,23 @@ def _workers_end_with_us() -> Iterator[None]:
         raise
 
 
+@contextmanager
+def _no_ctrl_c_for_what_starts_here() -> Iterator[None]:
+    """Ctrl-C reaches the whole process group, but we end the workers ourselves; it waits for us until we are back."""
+    if not hasattr(signal, "pthread_sigmask"):  # Windows: a worker that is still starting may show a trace
+        yield
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
 def _prepare_worker(shares: Any) -> None:
     global _shares
     _shares = shares
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the whole group; the parent process ends us
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
 def _run(place: int, name: str, module: str, quick: bool, drawn: bool) -> Verdict:

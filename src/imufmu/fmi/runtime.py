@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import shutil
+import sys
 from pathlib import Path
 
 PACKAGE = Path(__file__).parents[1]
@@ -42,6 +43,23 @@ def fingerprint(package: Path) -> str:
 
 # Now, because a package that was loaded from an unpacked FMU is deleted together with it, and goes on serving others.
 _IN_MEMORY = fingerprint(PACKAGE)
+
+
+def rejoin_installed() -> None:
+    """Where an FMU brought its part of imufmu into the process first, add the rest of an installed one of equal source.
+
+    Otherwise a script that has run one of our FMUs could not import imufmu.cosim any more.
+    """
+    if (PACKAGE / "cosim").is_dir():
+        return
+    for entry in sys.path:
+        installed = Path(entry) / "imufmu"
+        if (installed / "cosim").is_dir() and fingerprint(installed) == _IN_MEMORY:
+            for name, module in list(sys.modules.items()):
+                folder = str(installed.joinpath(*name.split(".")[1:]))
+                if name.split(".")[0] == "imufmu" and folder not in getattr(module, "__path__", [folder]):
+                    module.__path__.append(folder)
+            return
 
 
 def refusal(resources: Path) -> str:

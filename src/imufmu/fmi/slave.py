@@ -21,7 +21,7 @@ from pythonfmu.enums import Fmi2Status
 from ..block import Block, ParameterError, Variable
 from ..instance import SampledInstance, StepError, instantiate
 from ..signals import Parameter
-from .runtime import refusal
+from .runtime import refusal, rejoin_installed
 
 _STARTING, _INITIALISING, _STEPPING = range(3)
 
@@ -47,6 +47,7 @@ class BlockSlave(Fmi2Slave):
 
     def __init__(self, **kwargs: Any) -> None:
         super().__init__(**kwargs)
+        rejoin_installed()
         reason = refusal(Path(kwargs["resources"]))
         if reason:
             raise RuntimeError(f"{self.block.name}: {reason}")
