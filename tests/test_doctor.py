@@ -97,3 +97,22 @@ def test_what_is_no_archive_is_one_problem(content, tmp_path):
 def test_a_file_that_is_not_there_is_one_problem(tmp_path):
     (finding,) = examine(tmp_path / "none.fmu")
     assert "no such file" in finding.text
+
+
+def test_a_crash_when_it_is_closed_is_told_apart_from_one_in_the_step(changed):
+    """PythonFMU's wrapper sometimes ends the process after correct results."""
+    script = b"""import os
+from pythonfmu import Fmi2Slave
+class Lee2012(Fmi2Slave):
+    def __init__(self, **kwargs): super().__init__(**kwargs)
+    def get_real(self, vrs): return [0.0 for _ in vrs]
+    def set_real(self, vrs, values): pass
+    def set_integer(self, vrs, values): pass
+    def set_boolean(self, vrs, values): pass
+    def do_step(self, t, h): return True
+    def terminate(self): os.abort()
+"""
+    findings = examine(changed({"resources/lee2012_fmu.py": script}))
+    (trial,) = (f for f in findings if f.topic == "one step")
+    assert trial.level is Level.NOTE
+    assert trial.text.startswith("works on this machine, but when closed it crashed its process (SIGABRT)")

@@ -170,4 +170,6 @@ def _trial(path: Path, platforms: list[str], model: Any) -> Finding:
     said = f" It said: {' | '.join(trial.said.splitlines()[-3:])}" if trial.said else ""
     if trial.fault:
         return Finding(Level.PROBLEM, "one step", f"{trial.fault}.{said}")
+    if trial.closing:
+        return Finding(Level.NOTE, "one step", f"works on this machine, but when closed {trial.closing}.{said}")
     return Finding(Level.GOOD, "one step", f"works on this machine.{said}")

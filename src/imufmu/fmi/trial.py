@@ -14,14 +14,19 @@ from pathlib import Path
 import fmpy
 
 _SECONDS = 60.0
+_STEPPED = "imufmu: step taken"  # the process prints it; what follows is the end of the FMU
 
 
 @dataclass(frozen=True)
 class Trial:
-    """How it ended: ``fault`` is empty after a good step; ``said`` is what the FMU or FMPy printed."""
+    """How it ended: ``fault`` is empty after a good step; ``said`` is what the FMU or FMPy printed.
+
+    closing: what went wrong after a good step, when the FMU was closed; empty if nothing did.
+    """
 
     fault: str
     said: str
+    closing: str = ""
 
 
 def try_step(fmu: Path) -> Trial:
@@ -31,9 +36,11 @@ def try_step(fmu: Path) -> Trial:
         done = subprocess.run(command, capture_output=True, text=True, errors="replace", timeout=_SECONDS)
     except subprocess.TimeoutExpired:
         return Trial(f"it did not finish one step within {_SECONDS:g} s", "")
-    said = "\n".join(line for line in (done.stdout + done.stderr).splitlines() if line.strip())
+    printed = (done.stdout + done.stderr).splitlines()
+    said = "\n".join(line for line in printed if line.strip() and line != _STEPPED)
     if done.returncode < 0:
-        return Trial(f"it crashed its process ({signal.Signals(-done.returncode).name})", said)
+        crash = f"it crashed its process ({signal.Signals(-done.returncode).name})"
+        return Trial("", said, crash) if _STEPPED in printed else Trial(crash, said)
     if done.returncode:
         lines = said.splitlines() or [f"exit code {done.returncode}"]
         return Trial(lines[-1], "\n".join(lines[:-1]))
@@ -46,8 +53,21 @@ def main() -> None:
     experiment = fmpy.read_model_description(path, validate=False).defaultExperiment
     start = float(experiment.startTime or 0.0) if experiment else 0.0
     step = float(experiment.stepSize or 0.01) if experiment else 0.01
+
+    def stepped(time: float, _recorder: object) -> bool:
+        if time > start:
+            print(_STEPPED, flush=True)
+        return True
+
     try:
-        fmpy.simulate_fmu(path, validate=False, start_time=start, stop_time=start + step, output_interval=step)
+        fmpy.simulate_fmu(
+            path,
+            validate=False,
+            start_time=start,
+            stop_time=start + step,
+            output_interval=step,
+            step_finished=stepped,
+        )
     except Exception as error:  # whatever FMPy or the FMU raises is the finding
         print(f"{type(error).__name__}: {error}")
         sys.exit(1)
