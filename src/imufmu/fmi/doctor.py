@@ -167,6 +167,8 @@ def _trial(path: Path, platforms: list[str], model: Any) -> Finding:
     if not {fmpy.platform, fmpy.platform_tuple} & set(platforms):
         return Finding(Level.PROBLEM, "one step", f"not tried: no binary for this machine ({fmpy.platform})")
     trial = try_step(path)
+    if trial.fault and not try_step(path).fault:  # a crash by chance and one by design are different news
+        return Finding(Level.NOTE, "one step", f"works on this machine in one of two tries; in the other {trial.fault}")
     said = f" It said: {' | '.join(trial.said.splitlines()[-3:])}" if trial.said else ""
     if trial.fault:
         return Finding(Level.PROBLEM, "one step", f"{trial.fault}.{said}")
