@@ -11,12 +11,13 @@ import pytest
 from backends import BACKENDS, PLANT_STEP, Backend, InProcess, Refused
 from motions import angle
 from scipy.spatial.transform import Rotation
-from truth_consistency import assert_truth_consistent
+from truth_consistency import assert_signals_agree, assert_truth_consistent
 
 from imufmu import vocabulary as v
-from imufmu.block import Block, SampledBlock
+from imufmu.block import Block, ContinuousBlock, SampledBlock
+from imufmu.plants.truth import MID_EUROPE
 from imufmu.registry import BLOCKS, ESTIMATORS, PLANTS
-from imufmu.running import Trajectory
+from imufmu.running import Trajectory, simulate
 from imufmu.signals import UNITS, Signal
 from imufmu.vocabulary import Status
 
@@ -327,6 +328,23 @@ def test_the_truth_of_a_plant_does_not_depend_on_later_inputs(block: Block, back
     late = {name: np.where(np.arange(ROWS)[:, None] < 200, values, -values) for name, values in inputs.items()}
     one, other = (backend.run(block, given, {}, ROWS) for given in (inputs, late))
     assert all(np.array_equal(one[name][:200], other[name][:200]) for name in names(v.TRUTH))
+
+
+@over(PLANTS)
+def test_a_magnetic_disturbance_is_added_in_its_intervals(block: ContinuousBlock) -> None:
+    field = np.array([5.0, -3.0, 2.0])
+    times = {"disturbance_start": (0.5, 2.0, 0.0), "disturbance_stop": (1.5, 3.0, 9.0)}
+    disturbed = {"disturbances": 2, "disturbance_field": field, "disturbance_ramp": 0.25} | times
+    clean, run = simulate(block, 4.0, 0.01), simulate(block, 4.0, 0.01, parameters=disturbed)
+    R_NS = Rotation.from_quat(np.roll(run["q_NS"], -1, axis=1))
+    added = R_NS.apply(run["magnetic_field"] - clean["magnetic_field"])
+    flat = ((run.time > 0.76) & (run.time < 1.24)) | ((run.time > 2.26) & (run.time < 2.74))
+    off = (run.time <= 0.5) | ((run.time >= 1.5) & (run.time <= 2.0)) | (run.time >= 3.0)
+    assert added[flat] == pytest.approx(np.tile(field, (flat.sum(), 1)), abs=1e-13)  # rounding of 50 uT
+    assert not added[off].any()
+    assert np.array_equal(run["specific_force"], clean["specific_force"])
+    undisturbed = Trajectory(run.time[off], {name: values[off] for name, values in run.values.items()})
+    assert_signals_agree(undisturbed, v.GRAVITY, np.array(MID_EUROPE))
 
 
 def test_vocabulary_names_are_used_with_their_own_declaration() -> None:

@@ -50,6 +50,18 @@ EXTERNAL_ACCELERATION = _xyz(
 POSITION = _xyz("position", "m", 1e7, 1.0, "Position of the mounting point, in N")
 VELOCITY = _xyz("velocity", "m/s", 1e5, 1.0, "Velocity of the mounting point, in N")
 
+# What the wheels of a vehicle say: plant out, estimator in.
+FORWARD_SPEED = Signal(
+    "forward_speed", "m/s", "Speed along the vehicle's x axis as its wheels tell it", -200.0, 200.0, nominal=10.0
+)
+
+
+def skeleton(points: int) -> Signal:
+    """Local variable of a plant whose body can be drawn: this many points, in N, joined by one line."""
+    description = "Points of the body, in N, joined by one line to draw it"
+    return Signal("skeleton", "m", description, -1e7, 1e7, (points, 3))
+
+
 # What an estimator says about itself.
 TILT_STD = Signal("tilt_std", "rad", "One-sigma angle between estimated and true vertical", 0.0, 1e3, nominal=0.01)
 STATUS = Signal("status", "1", "0 ok, else the sum of imufmu.vocabulary.Status flags", 0.0, 1023.0)

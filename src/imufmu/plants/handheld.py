@@ -30,8 +30,6 @@ The sensor. With R = R_NB and w' from the time derivative of (1),
 
     r_S = r + R l,   v_S = v + R (w x l),   a_S = r'' + R (w' x l + w x (w x l))       (3)
 
-A disturbed magnetic field: a constant vector in N that is added in up to three intervals.
-
 [1] Rizun, Optimal Wiener Filter for a Body Mounted Inertial Attitude Sensor, Journal of Navigation 61, 2008,
     doi:10.1017/S0373463308004736
 """
@@ -48,12 +46,12 @@ import casadi as ca
 from ..block import ContinuousBlock, Expressions
 from ..rotations import multiply, quaternion_from_euler, rotate, unit
 from ..signals import Parameter, Signal, State, integer, real, switch
-from .pendulum import along
-from .random_vectors import DRAWS, LINES, lines, random_vector, sum_of_lines, windows
-from .truth import OUTPUTS, PARAMETERS, truth
+from .random_vectors import DRAWS, LINES, lines, random_vector, sum_of_lines
+from .time_functions import along, windows
+from .truth import OUTPUTS, PARAMETERS, magnetic_field, times, truth
 
 HAND, WHITE_VELOCITY = 0, 1
-BURSTS, DISTURBANCES = 4, 3
+BURSTS = 4
 ATTITUDE_DRAWS = 4
 
 WHITE_FROM, WHITE_TO = 1e-3, 10.0  # lines of the white velocity, relative to its cut-off
@@ -135,7 +133,6 @@ def output(x: SimpleNamespace, u: SimpleNamespace, p: SimpleNamespace, t: Any) -
     q_NB, l_B = unit(x.attitude), p.imu_position
     v_l = ca.cross(w, l_B)
     a_l = ca.cross(w_rate, l_B) + ca.cross(w, v_l)
-    disturbed = windows(t, p.disturbances, p.disturbance_start, p.disturbance_stop, p.disturbance_ramp)
     return {
         **truth(
             q_NB,
@@ -144,14 +141,10 @@ def output(x: SimpleNamespace, u: SimpleNamespace, p: SimpleNamespace, t: Any) -
             x.velocity + rotate(q_NB, v_l),
             acceleration(t, x, p) + rotate(q_NB, a_l),
             p.g,
-            p.earth_field + disturbed * p.disturbance_field,
+            magnetic_field(t, p),
         ),
         "activity": activity(t, p),
     }
-
-
-def _times(name: str, count: int, text: str) -> Parameter:
-    return real(name, "s", 0.0, (-1e6, 1e6), text, shape=(count,))
 
 
 def _random(
@@ -192,31 +185,13 @@ tumbles, as no hand does for long. The position is that of the integrated accele
         real("velocity_noise_density", "m/s/sqrt(Hz)", 1.0, (0, 1e3), "Motion 1: delta_v, one-sided density"),
         real("velocity_cutoff", "rad/s", 10.0, (1e-3, 1e3), "Motion 1: omega_c, where the density has fallen by half"),
         integer("bursts", 0, (0, BURSTS), "Number of bursts of motion; 0 moves all the time"),
-        _times("burst_start", BURSTS, "Start of each burst"),
-        _times("burst_stop", BURSTS, "End of each burst"),
+        times("burst_start", BURSTS, "Start of each burst"),
+        times("burst_stop", BURSTS, "End of each burst"),
         real("burst_ramp", "s", 0.3, (0.01, 1e6), "Time in which a burst grows, and fades, inside its times"),
         switch("turns_at_rest", "0 turns in the bursts only, 1 turns all the time"),
         real("initial_attitude", "rad", 0.0, (-pi, pi), "Roll, pitch, yaw at the start", shape=(3,)),
         switch("random_attitude", "1 starts at an attitude drawn from all there are, 0 at initial_attitude"),
         real("imu_position", "m", 0.0, (-10, 10), "Sensor from the centre of rotation, in S", shape=(3,)),
-        real(
-            "disturbance_field",
-            "uT",
-            0.0,
-            (-1e3, 1e3),
-            "Magnetic disturbance East, North, Up",
-            shape=(3,),
-        ),
-        integer("disturbances", 0, (0, DISTURBANCES), "Number of intervals of the magnetic disturbance"),
-        _times("disturbance_start", DISTURBANCES, "Start of each magnetic disturbance"),
-        _times("disturbance_stop", DISTURBANCES, "End of each magnetic disturbance"),
-        real(
-            "disturbance_ramp",
-            "s",
-            0.5,
-            (0.01, 1e6),
-            "Time in which a disturbance grows, and fades, inside its times",
-        ),
     ),
     state=(
         State("attitude", (4,)),

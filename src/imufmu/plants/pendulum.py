@@ -34,7 +34,6 @@ amplitude <= |offset| a joint bends to one side only: a knee that never hyperext
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from math import pi, radians
@@ -46,18 +45,10 @@ import casadi as ca
 from ..block import ContinuousBlock, Expressions
 from ..rotations import multiply, quaternion_from_euler, rotate_back
 from ..signals import Parameter, Signal, State, integer, real
-from .truth import OUTPUTS, PARAMETERS, truth
+from .time_functions import along, smooth_step
+from .truth import OUTPUTS, PARAMETERS, magnetic_field, truth
 
 FREE, DRIVEN = 0, 1
-
-
-def along(f: Callable[[Any], Any], at: Any, rate: Any, acceleration: Any = 0) -> tuple[Any, Any, Any]:
-    """Value and first two time derivatives of f(q(t)), f a column, where q is ``at`` and has these derivatives."""
-    s = ca.SX.sym("s")
-    value = f(at + rate * s + acceleration * s**2 / 2)
-    slope = ca.jacobian(value, s)
-    now = ca.substitute([value, slope, ca.jacobian(slope, s)], [s], [ca.SX(0)])
-    return now[0], now[1], now[2]
 
 
 def arms_to(link: Any, distance: Any, p: SimpleNamespace) -> Any:
@@ -110,12 +101,6 @@ def driven_angles(t: Any, p: SimpleNamespace) -> Any:
     return e * (p.drive_offset + p.drive_amplitude * ca.sin(psi + p.drive_phase))
 
 
-def smooth_step(s: Any) -> Any:
-    """Polynomial from 0 (s <= 0) to 1 (s >= 1) whose first three derivatives are 0 at both ends."""
-    s = ca.fmin(ca.fmax(s, 0), 1)
-    return s**4 * (35 - 84 * s + 70 * s**2 - 20 * s**3)
-
-
 def joint_motion(x: SimpleNamespace, u: SimpleNamespace, p: SimpleNamespace, t: Any) -> tuple[Any, Any, Any]:
     """Joint angles, rates and accelerations (n,) of the chosen motion."""
     free = (x.angle, x.angle_rate, free_acceleration(x.angle, x.angle_rate, u.torque, p))
@@ -153,7 +138,7 @@ def output(x: SimpleNamespace, u: SimpleNamespace, p: SimpleNamespace, t: Any) -
 
     T, V = energies(theta, rate, p)
     return {
-        **truth(multiply(q_NL, q_LS), w_S, in_N(r_H), in_N(v_H), in_N(a_H), p.g, p.earth_field),
+        **truth(multiply(q_NL, q_LS), w_S, in_N(r_H), in_N(v_H), in_N(a_H), p.g, magnetic_field(t, p)),
         "angle": theta,
         "angle_rate": rate,
         "energy": T + V,

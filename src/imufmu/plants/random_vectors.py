@@ -1,4 +1,4 @@
-"""Random vectors over time, of a stated mean and largest length, and windows that switch them on and off.
+"""Random vectors over time, of a stated mean and largest length.
 
     s_j(t) = sqrt(2 / N) sum_i sin(2 pi f_ij t + phi_ij),  j = 1, 2, 3                (1)
     u(t)   = F(|s|),  F(r) = erf(r / sqrt 2) - sqrt(2 / pi) r exp(-r^2 / 2)           (2)
@@ -21,7 +21,6 @@ from typing import Any
 import casadi as ca
 
 from ..rotations import norm, unit
-from .pendulum import smooth_step
 
 LINES = 12  # sinusoids per axis
 DRAWS = 2 * 3 * LINES  # standard normal draws behind one random vector
@@ -52,15 +51,3 @@ def random_vector(t: Any, frequency: Any, phase: Any, mean: Any, peak_to_mean: A
     r = norm(s)
     u = ca.erf(r / ca.sqrt(2)) - ca.sqrt(2 / pi) * r * ca.exp(-(r**2) / 2)
     return mean * peak_to_mean * ca.fmax(u, _SMALLEST) ** (peak_to_mean - 1) * unit(s)
-
-
-def windows(t: Any, count: Any, start: Any, stop: Any, ramp: Any) -> Any:
-    """1 in the first ``count`` of the intervals, 0 outside, with three continuous derivatives.
-
-    start, stop: (n,), s. The window rises and falls within ``ramp`` (s) inside its interval.
-    """
-    outside = 1
-    for i in range(start.numel()):
-        inside = smooth_step((t - start[i]) / ramp) * smooth_step((stop[i] - t) / ramp)
-        outside *= 1 - ca.if_else(i < count, inside, 0)
-    return 1 - outside

@@ -24,8 +24,8 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from ...plants.pendulum import along, smooth_step
-from ...plants.random_vectors import LINES, random_vector, sum_of_lines, windows
+from ...plants.random_vectors import LINES, random_vector, sum_of_lines
+from ...plants.time_functions import along, smooth_step, windows
 from ...plants.truth import OUTPUTS, truth
 from ...rotations import conjugate, multiply, over_rows, quaternion_from_euler
 from ...running import Trajectory
