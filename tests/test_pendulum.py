@@ -14,7 +14,8 @@ from truth_consistency import assert_truth_consistent
 
 from imufmu.block import ContinuousBlock
 from imufmu.instance import ContinuousInstance
-from imufmu.plants.pendulum import DOUBLE_PENDULUM, PENDULUM, free_acceleration, pendulum
+from imufmu.plants.pendulum import DOUBLE_PENDULUM, PENDULUM, pendulum
+from imufmu.plants.pendulum_parts import free_acceleration
 from imufmu.plants.truth import MID_EUROPE
 from imufmu.registry import BLOCKS
 from imufmu.running import simulate

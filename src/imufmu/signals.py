@@ -52,6 +52,8 @@ UNITS = {
         Unit("kg", {"kg": 1}),
         Unit("kg.m2", {"kg": 1, "m": 2}),
         Unit("N.m", {"kg": 1, "m": 2, "s": -2}),
+        Unit("N.m/rad2", {"kg": 1, "m": 2, "s": -2, "rad": -2}),
+        Unit("s/rad", {"s": 1, "rad": -1}),
         Unit("N.m.s/rad", {"kg": 1, "m": 2, "s": -1, "rad": -1}),
         Unit("J", {"kg": 1, "m": 2, "s": -2}),
         Unit("uT", {"kg": 1, "s": -2, "A": -1}, factor=1e-6),

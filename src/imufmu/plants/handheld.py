@@ -30,6 +30,8 @@ The sensor. With R = R_NB and w' from the time derivative of (1),
 
     r_S = r + R l,   v_S = v + R (w x l),   a_S = r'' + R (w' x l + w x (w x l))       (3)
 
+To be drawn, the body is a box of the size of a telephone around the sensor.
+
 [1] Rizun, Optimal Wiener Filter for a Body Mounted Inertial Attitude Sensor, Journal of Navigation 61, 2008,
     doi:10.1017/S0373463308004736
 """
@@ -43,6 +45,7 @@ from typing import Any
 
 import casadi as ca
 
+from .. import vocabulary as v
 from ..block import ContinuousBlock, Expressions
 from ..rotations import multiply, quaternion_from_euler, rotate, unit
 from ..signals import Parameter, Signal, State, integer, real, switch
@@ -53,6 +56,10 @@ from .truth import OUTPUTS, PARAMETERS, magnetic_field, times, truth
 HAND, WHITE_VELOCITY = 0, 1
 BURSTS = 4
 ATTITUDE_DRAWS = 4
+
+BOX = (0.15, 0.07, 0.02)  # m, edges of the drawn body along x, y, z of S
+# Corners in the order of one line that passes every edge; bits 1, 2, 4 of a corner are its side in x, y, z.
+ROUND_THE_BOX = (0, 1, 3, 2, 0, 4, 5, 1, 5, 7, 3, 7, 6, 2, 6, 4)
 
 WHITE_FROM, WHITE_TO = 1e-3, 10.0  # lines of the white velocity, relative to its cut-off
 
@@ -131,20 +138,28 @@ def output(x: SimpleNamespace, u: SimpleNamespace, p: SimpleNamespace, t: Any) -
     """Truth at the sensor. (3)"""
     w, w_rate, _ = along(partial(rate, x=x, p=p), t, 1)
     q_NB, l_B = unit(x.attitude), p.imu_position
+    r_S = x.position + rotate(q_NB, l_B)
     v_l = ca.cross(w, l_B)
     a_l = ca.cross(w_rate, l_B) + ca.cross(w, v_l)
     return {
         **truth(
             q_NB,
             w,
-            x.position + rotate(q_NB, l_B),
+            r_S,
             x.velocity + rotate(q_NB, v_l),
             acceleration(t, x, p) + rotate(q_NB, a_l),
             p.g,
             magnetic_field(t, p),
         ),
         "activity": activity(t, p),
+        "skeleton": box(r_S, q_NB),
     }
+
+
+def box(centre: Any, q_NB: Any) -> Any:
+    """Corners (16, 3), in N, of the drawn body at this place (3,) and attitude."""
+    corners = [ca.vertcat(*(edge * ((c >> i & 1) - 0.5) for i, edge in enumerate(BOX))) for c in ROUND_THE_BOX]
+    return ca.horzcat(*(centre + rotate(q_NB, corner) for corner in corners)).T
 
 
 def _random(
@@ -176,7 +191,10 @@ tumbles, as no hand does for long. The position is that of the integrated accele
     "doi:10.1017/S0373463308004736 (the motions)",
     inputs=(),
     outputs=OUTPUTS,
-    locals=(Signal("activity", "1", "1 while the body is moved, 0 at rest, between in a ramp", 0, 1),),
+    locals=(
+        Signal("activity", "1", "1 while the body is moved, 0 at rest, between in a ramp", 0, 1),
+        v.skeleton(len(ROUND_THE_BOX)),
+    ),
     own_parameters=(
         *PARAMETERS,
         integer("motion", HAND, (HAND, WHITE_VELOCITY), "Translation: 0 hand, 1 white velocity (Rizun 2008)"),

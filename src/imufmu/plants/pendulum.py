@@ -1,4 +1,4 @@
-"""Planar pendulum with one link or two, free or driven, with a sensor on one of them.
+"""Planar pendulum with one link or two, free or driven, with a sensor on one of them, or on each.
 
     symbol    here               unit       meaning, for link i
     theta_i   x.angle            rad        angle of joint i, relative to the link before; 0 hangs straight down
@@ -8,10 +8,12 @@
     m_i, I_i  p.mass, p.inertia  kg, kg.m2  mass, moment of inertia about the centre of mass
     b_i       p.damping          N.m.s/rad  viscous damping of joint i
     tau_i     u.torque           N.m        torque of the drive, from link i - 1 (or the support) on link i
+    s_i       stop_torque        N.m        torque of the end stops of joint i
+    k_i, a_i  p.stop_stiffness, p.stop_damping          N.m/rad2, s/rad
 
 Lagrangian mechanics, T kinetic and V potential energy (zero with every mass at the height of the pivot):
 
-    d/dt (dT/dtheta') - d(T - V)/dtheta + b theta' = tau                              (1)
+    d/dt (dT/dtheta') - d(T - V)/dtheta + b theta' = tau + s                          (1)
     T = sum (m_i |r_i'|^2 + I_i phi_i'^2) / 2,    V = sum m_i g r_i,z                  (2)
     r_i = sum_{j<i} l_j d(phi_j) + c_i d(phi_i),  d(phi) = (sin phi, -cos phi)         (3)
 
@@ -29,12 +31,30 @@ changes during the trial, hang at rest again.
 The envelope e rises from 0 to 1 and falls back with three continuous derivatives, so the jerk is continuous. While
 amplitude <= |offset| a joint bends to one side only: a knee that never hyperextends.
 
+End stops, as the stick that keeps the knee from hyperextending in [1]. A joint that is d beyond its upper stop is
+pushed back by the contact law of [2],
+
+    s = -k d^2 max(0, 1 + a d')                                                       (5)
+
+and at the lower stop alike. The square makes the jerk continuous, a > 0 takes energy from every contact, and a stop
+never pulls. The springs of the stops count as energy.
+
+Swing-up. A drive in the first joint moves the energy E = T + V to one aimed at [3], without ever passing tau_max:
+
+    tau_1 = tau_max tanh(gain (E_aim - E) theta_1' / tau_max),  E_aim = V_hanging + r (V_upright - V_hanging)    (6)
+
+so that dE/dt = tau_1 theta_1' has the sign of E_aim - E. Above r = 1 the pendulum goes over the top again and again.
+
 [1] Bennett, Jafari, Gans, Motion Based Acceleration Correction for Improved Sensor Orientation Estimates, BSN 2014
+[2] Hunt, Crossley, Coefficient of Restitution Interpreted as Damping in Vibroimpact, Journal of Applied Mechanics
+    42(2), 1975, doi:10.1115/1.3423596; here with the exponent 2
+[3] Astrom, Furuta, Swinging up a Pendulum by Energy Control, Automatica 36(2), 2000,
+    doi:10.1016/S0005-1098(99)00140-5; here with a torque in place of the motion of the pivot
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from math import pi, radians
 from types import SimpleNamespace
@@ -42,54 +62,24 @@ from typing import Any
 
 import casadi as ca
 
+from .. import vocabulary as v
 from ..block import ContinuousBlock, Expressions
 from ..rotations import multiply, quaternion_from_euler, rotate_back
 from ..signals import Parameter, Signal, State, integer, real
+from .pendulum_parts import (
+    arms_to,
+    chain_end,
+    energies,
+    free_acceleration,
+    joints,
+    required_torque,
+    stop_energy,
+    swing_up_torque,
+)
 from .time_functions import along, smooth_step
 from .truth import OUTPUTS, PARAMETERS, magnetic_field, truth
 
-FREE, DRIVEN = 0, 1
-
-
-def arms_to(link: Any, distance: Any, p: SimpleNamespace) -> Any:
-    """Arms (n,) of the chain that ends on this link (1 to n), at this distance from its joint."""
-    number = ca.SX(range(1, p.length.numel() + 1))
-    return ca.if_else(number == link, distance, (number < link) * p.length)
-
-
-def chain_end(theta: Any, arms: Any) -> Any:
-    """Point (x, z) in the plane of H, relative to the pivot, at the end of arms (n,) along the n links. (3)"""
-    phi = ca.cumsum(theta)
-    return ca.vertcat(ca.dot(arms, ca.sin(phi)), -ca.dot(arms, ca.cos(phi)))
-
-
-def energies(theta: Any, rate: Any, p: SimpleNamespace) -> tuple[Any, Any]:
-    """Kinetic and potential energy (J). (2)"""
-    phi_rate = ca.cumsum(rate)
-    T, V = 0, 0
-    for i in range(theta.numel()):
-        r, r_rate, _ = along(partial(chain_end, arms=arms_to(i + 1, p.com_distance[i], p)), theta, rate)
-        T += (p.mass[i] * ca.sumsqr(r_rate) + p.inertia[i] * phi_rate[i] ** 2) / 2
-        V += p.mass[i] * p.g * r[1]
-    return T, V
-
-
-def required_torque(theta: Any, rate: Any, acceleration: Any, p: SimpleNamespace) -> Any:
-    """Torque (n,) of the drive that this motion takes. (1)"""
-    q, dq = ca.SX.sym("q", theta.numel()), ca.SX.sym("dq", theta.numel())
-    T, V = energies(q, dq, p)
-    momentum = ca.gradient(T, dq)
-    momentum_rate = ca.jtimes(momentum, q, dq) + ca.jtimes(momentum, dq, acceleration)
-    torque = momentum_rate - ca.gradient(T - V, q) + p.damping * dq
-    return ca.substitute(torque, ca.vertcat(q, dq), ca.vertcat(theta, rate))
-
-
-def free_acceleration(theta: Any, rate: Any, torque: Any, p: SimpleNamespace) -> Any:
-    """Joint accelerations (n,) under this torque of the drive: (1) is linear in them."""
-    ddq = ca.SX.sym("ddq", theta.numel())
-    required = required_torque(theta, rate, ddq, p)
-    M = ca.jacobian(required, ddq)
-    return ca.solve(M, torque - ca.substitute(required, ddq, ca.SX.zeros(ddq.shape)))
+FREE, DRIVEN, SWING_UP = 0, 1, 2
 
 
 def driven_angles(t: Any, p: SimpleNamespace) -> Any:
@@ -103,7 +93,8 @@ def driven_angles(t: Any, p: SimpleNamespace) -> Any:
 
 def joint_motion(x: SimpleNamespace, u: SimpleNamespace, p: SimpleNamespace, t: Any) -> tuple[Any, Any, Any]:
     """Joint angles, rates and accelerations (n,) of the chosen motion."""
-    free = (x.angle, x.angle_rate, free_acceleration(x.angle, x.angle_rate, u.torque, p))
+    torque = u.torque + ca.if_else(p.motion == SWING_UP, swing_up_torque(x.angle, x.angle_rate, p), 0)
+    free = (x.angle, x.angle_rate, free_acceleration(x.angle, x.angle_rate, torque, p))
     driven = along(partial(driven_angles, p=p), t, 1)
     theta, rate, acceleration = (ca.if_else(p.motion == DRIVEN, d, f) for d, f in zip(driven, free, strict=True))
     return theta, rate, acceleration
@@ -111,7 +102,7 @@ def joint_motion(x: SimpleNamespace, u: SimpleNamespace, p: SimpleNamespace, t: 
 
 def initial(p: SimpleNamespace) -> Expressions:
     """Start of the free motion; a driven one starts hanging at rest."""
-    free = p.motion == FREE
+    free = p.motion != DRIVEN
     return dict(angle=ca.if_else(free, p.initial_angle, 0), angle_rate=ca.if_else(free, p.initial_rate, 0))
 
 
@@ -122,28 +113,41 @@ def dynamics(x: SimpleNamespace, u: SimpleNamespace, p: SimpleNamespace, t: Any)
 
 
 def output(x: SimpleNamespace, u: SimpleNamespace, p: SimpleNamespace, t: Any) -> Expressions:
-    """Truth at the sensor, joint motion, energy and torque."""
-    theta, rate, acceleration = joint_motion(x, u, p, t)
-    arms = arms_to(p.imu_link, p.imu_distance, p)
-    r_H, v_H, a_H = along(partial(chain_end, arms=arms), theta, rate, acceleration)
+    """Truth at the sensor, what a second sensor on the upper link reads, joint motion, energy and torque."""
+    motion = joint_motion(x, u, p, t)
+    theta, rate, acceleration = motion
+    T, V = energies(theta, rate, p)
+    count = 2 * pi / p.encoder_counts
+    found = {
+        **truth_on_link(p.imu_link, p.imu_distance, motion, p, t),
+        "angle": theta,
+        "angle_rate": rate,
+        "encoder": count * ca.floor(theta / count + 0.5),
+        "energy": T + V + stop_energy(theta, p),
+        "joint_torque": required_torque(theta, rate, acceleration, p),
+        "skeleton": ca.horzcat(*(in_N(place, p) for place in ca.horzsplit(joints(theta, p)))).T,
+    }
+    if theta.numel() > 1:
+        upper = truth_on_link(1, p.upper_imu_distance, motion, p, t)
+        found |= {f"upper_{signal.name}": upper[signal.name] for signal in v.IDEAL_IMU}
+    return found
 
-    up_to_sensor = ca.SX(range(1, theta.numel() + 1)) <= p.imu_link
+
+def truth_on_link(link: Any, distance: Any, motion: tuple[Any, Any, Any], p: SimpleNamespace, t: Any) -> Expressions:
+    """Truth of a sensor on this link (1 to n), at this distance (m) from its joint."""
+    theta, rate, _ = motion
+    r_H, v_H, a_H = along(partial(chain_end, arms=arms_to(link, distance, p)), *motion)
+    up_to_sensor = ca.SX(range(1, theta.numel() + 1)) <= link
     phi, phi_rate = ca.dot(up_to_sensor, theta), ca.dot(up_to_sensor, rate)
     q_LS = quaternion_from_euler(*ca.vertsplit(p.mount))
     q_NL = quaternion_from_euler(0, -phi, p.heading)  # of half angles: continuous however often the link goes round
     w_S = rotate_back(q_LS, ca.vertcat(0, -phi_rate, 0))
+    return truth(multiply(q_NL, q_LS), w_S, *(in_N(a, p) for a in (r_H, v_H, a_H)), p.g, magnetic_field(t, p))
 
-    def in_N(plane: Any) -> Any:
-        return ca.vertcat(ca.cos(p.heading) * plane[0], ca.sin(p.heading) * plane[0], plane[1])
 
-    T, V = energies(theta, rate, p)
-    return {
-        **truth(multiply(q_NL, q_LS), w_S, in_N(r_H), in_N(v_H), in_N(a_H), p.g, magnetic_field(t, p)),
-        "angle": theta,
-        "angle_rate": rate,
-        "energy": T + V,
-        "joint_torque": required_torque(theta, rate, acceleration, p),
-    }
+def in_N(plane: Any, p: SimpleNamespace) -> Any:
+    """Components in N (3,) of a vector (x, z) in the plane of H."""
+    return ca.vertcat(ca.cos(p.heading) * plane[0], ca.sin(p.heading) * plane[0], plane[1])
 
 
 @dataclass(frozen=True)
@@ -159,6 +163,7 @@ class Start:
     damping: tuple[float, ...]
     angle: tuple[float, ...]
     imu_distance: float
+    swing_up_torque: float
     offset: tuple[float, ...]
     amplitude: tuple[float, ...]
     phase: tuple[float, ...]
@@ -175,6 +180,7 @@ LABORATORY = Start(
     damping=(0.02,),
     angle=(radians(60),),
     imu_distance=0.9,
+    swing_up_torque=3.0,
     offset=(0.0,),
     amplitude=(radians(30),),
     phase=(0.0,),
@@ -194,9 +200,16 @@ LEG = Start(
     damping=(0.2, 0.1),
     angle=(radians(40), radians(-20)),
     imu_distance=0.2,
+    swing_up_torque=15.0,
     offset=(radians(10), radians(-30)),
     amplitude=(radians(20), radians(30)),
     phase=(0.0, -pi / 2),
+)
+
+UPPER_DISTANCE = "Second sensor from the first joint, along the first link"
+UPPER_IMU = tuple(
+    replace(signal, name=f"upper_{signal.name}", description=f"Sensor on the first link: {signal.description}")
+    for signal in v.IDEAL_IMU
 )
 
 DOC = """The links swing in a vertical plane that is turned by heading from East towards North. Angles are relative to
@@ -206,8 +219,12 @@ sits on link imu_link, imu_distance from the joint of that link, turned by the Z
 and initial_rate and follows gravity, damping and the input torque, which is held over a communication step. Motion 1 is
 driven: rest for drive_rest, a swing of drive_duration whose frequency goes from drive_start_frequency to
 drive_end_frequency, rest again. Its times count from 0 whatever the start time is, the torque input has no effect, and
-its angles are exact at any step. A free pendulum is a hard case for an accelerometer: near its centre of oscillation
-the specific force stays along the link at any tilt. For a sensor on each link use two plants with the same motion."""
+its angles are exact at any step. Motion 2 is like motion 0 with a drive in the first joint that swings the pendulum up:
+with at most swing_up_torque it brings the energy to swing_up_energy, 0 hanging at rest, 1 standing at rest, more for
+turning over. End stops, where stop_stiffness is not 0, push back a joint beyond stop_low or stop_high. The encoders
+read each joint angle in counts of a turn. A free pendulum is a hard case for an accelerometer: near its centre of
+oscillation the specific force stays along the link at any tilt. With two links, a second ideal IMU, mounted alike, sits
+upper_imu_distance from the first joint on the first link; the truth is that of the sensor on imu_link."""
 
 
 def pendulum(links: int) -> ContinuousBlock:
@@ -223,12 +240,15 @@ def pendulum(links: int) -> ContinuousBlock:
         inputs=(Signal("torque", "N.m", "Torque of the drive at each joint (motion 0)", -1e6, 1e6, per_link),),
         outputs=(
             *OUTPUTS,
+            *(UPPER_IMU if links > 1 else ()),
             Signal("angle", "rad", "Joint angles, each relative to the link before", -1e6, 1e6, per_link),
             Signal("angle_rate", "rad/s", "Joint rates", -1e3, 1e3, per_link),
+            Signal("encoder", "rad", "Joint angles as the encoders read them, in whole counts", -1e6, 1e6, per_link),
         ),
         locals=(
             Signal("energy", "J", "Kinetic plus potential energy, the latter 0 at the height of the pivot", -1e9, 1e9),
             Signal("joint_torque", "N.m", "Torque of the drive that the motion takes", -1e9, 1e9, per_link),
+            v.skeleton(links + 1),
         ),
         own_parameters=(*PARAMETERS, *_parameters(start)),
         state=(State("angle", per_link), State("angle_rate", per_link)),
@@ -249,21 +269,32 @@ def _parameters(start: Start) -> tuple[Parameter, ...]:
         return real(name, unit, values, bounds, doc, shape=(links,))
 
     return (
-        integer("motion", FREE, (FREE, DRIVEN), "0 free or torque-driven, 1 prescribed swing"),
+        integer("motion", FREE, (FREE, SWING_UP), "0 free or torque-driven, 1 prescribed swing, 2 swing-up"),
         real("heading", "rad", 0.0, (-pi, pi), "Direction of the swing, from East towards North"),
         each("length", "m", start.length, (0.01, 100), "Joint to next joint, or to the end of the last link"),
         each("mass", "kg", start.mass, (0.01, 1000), "Mass of each link"),
         each("com_distance", "m", start.com_distance, (0.01, 100), "Joint to the centre of mass of its link"),
         each("inertia", "kg.m2", start.inertia, (0, 1e6), "Moment of inertia about the centre of mass; 0 point mass"),
         each("damping", "N.m.s/rad", start.damping, (0, 1e4), "Viscous damping of each joint"),
-        each("initial_angle", "rad", start.angle, (-2 * pi, 2 * pi), "Motion 0: joint angles at the start"),
-        each("initial_rate", "rad/s", 0.0, (-100, 100), "Motion 0: joint rates at the start"),
+        each("initial_angle", "rad", start.angle, (-2 * pi, 2 * pi), "Motions 0 and 2: joint angles at the start"),
+        each("initial_rate", "rad/s", 0.0, (-100, 100), "Motions 0 and 2: joint rates at the start"),
+        each("stop_low", "rad", -pi, (-1e3, 1e3), "Lower end stop of each joint"),
+        each("stop_high", "rad", pi, (-1e3, 1e3), "Upper end stop of each joint"),
+        each(
+            "stop_stiffness", "N.m/rad2", 0.0, (0, 1e6), "Torque of an end stop over the square of its yielding; 0 none"
+        ),
+        each("stop_damping", "s/rad", 0.1, (0, 1e3), "Growth of the torque of an end stop with the rate of yielding"),
+        integer("encoder_counts", 1000, (1, 10**6), "Counts of each encoder in a turn"),
         integer("imu_link", links, (1, links), "Link that carries the sensor"),
         real("imu_distance", "m", start.imu_distance, (0, 100), "Sensor from the joint of its link, along the link"),
+        *([real("upper_imu_distance", "m", start.imu_distance, (0, 100), UPPER_DISTANCE)] if links > 1 else []),
         real("mount", "rad", (0, 0, pi / 4), (-pi, pi), "Roll, pitch, yaw of the sensor in its link", shape=(3,)),
         each("drive_offset", "rad", start.offset, (-pi, pi), "Motion 1: middle of the swing"),
         each("drive_amplitude", "rad", start.amplitude, (0, pi), "Motion 1: half of the swing"),
         each("drive_phase", "rad", start.phase, (-pi, pi), "Motion 1: phase of the swing at its start"),
+        real("swing_up_energy", "1", 1.2, (0, 100), "Motion 2: energy aimed at; 0 hanging, 1 standing, both at rest"),
+        real("swing_up_torque", "N.m", start.swing_up_torque, (1e-6, 1e6), "Motion 2: largest torque of the drive"),
+        real("swing_up_gain", "s/rad", 1.0, (0, 1e6), "Motion 2: torque over missing energy and rate"),
         real("drive_start_frequency", "Hz", 0.4, (0, 10), "Motion 1: frequency at the start; a stroll"),
         real("drive_end_frequency", "Hz", 1.2, (0, 10), "Motion 1: frequency at the end; strides of a brisk walk"),
         real("drive_rest", "s", 2.0, (0, 1e6), "Motion 1: rest before the swing"),
