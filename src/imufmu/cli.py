@@ -156,30 +156,49 @@ def run(
     output: Output = None,
     plot: Plot = False,
     report: Annotated[Path | None, typer.Option("--report", help="Write an HTML report to this file.")] = None,
+    animation: Annotated[
+        Path | None,
+        typer.Option("--animate", help="Draw the body and the estimated horizons into this .gif or .mp4 file."),
+    ] = None,
 ) -> None:
     """Co-simulate a system of FMUs and compare its estimators with its plant.
 
     \b
       imufmu run pendulum_lee2012
       imufmu run pendulum_lee2012 --set lee2012.mode=3 --set imu.seed=7 --plot
+      imufmu run pendulum_swing_up --report swing_up.html --animate swing_up.gif
       imufmu run my_system.ssd --stop 60 --step 0.005 --output run.csv
+
+    With --report or --animate the results also hold the points of the body, where the plant has the local variable
+    skeleton.
     """
     from .cosim import System, locate, simulate
-    from .evaluate.present import present_run
+    from .evaluate.present import animate, check_pictures, present_run, recorded
 
     check_target(output, ".csv", ".h5")
     check_target(report, ".html")
+    check_target(animation, ".gif", ".mp4")
     read = System.read(locate(system))
+    check_pictures(read, plot, report, animation)
     with progress_bar(f"running {read.description.name}") as progress:
         result = simulate(
-            read, stop_time=stop, step=step, parameters=parsed_sets(sets), jacobi=jacobi, progress=progress
+            read,
+            stop_time=stop,
+            step=step,
+            parameters=parsed_sets(sets),
+            record=recorded(read) if report or animation else None,
+            jacobi=jacobi,
+            progress=progress,
         )
     figure = Path(f"{read.description.name}.png") if plot else None
     notes(result.notes)
     print_table(present_run(result, figure, report))
     if output:
         (result.to_csv if output.suffix.lower() == ".csv" else result.to_hdf5)(output)
-    written(output, figure, report)
+    if animation:
+        with progress_bar(f"drawing {animation.name}") as progress:
+            notes(animate(result, animation, progress))
+    written(output, figure, report, animation)
 
 
 @app.command()

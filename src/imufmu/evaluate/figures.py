@@ -9,9 +9,11 @@ from pathlib import Path
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
 from ..files import atomic_write
 from ..running import Trajectory
+from . import metrics
 from .metrics import Signals
 
 _DPI = 100
@@ -32,9 +34,8 @@ def attitude_figure(
     panels = [name for name in ("roll", "pitch") if any(name in e.values for e in estimates.values())]
     panels += ["tilt"] if any("tilt" in error for _, error in errors.values()) else []
     panels += ["external_acceleration"] if any("external_acceleration" in e.values for e in estimates.values()) else []
-    figure = Figure(figsize=(10, 0.8 + 2.3 * len(panels)), layout="constrained")
+    figure, axes = _panels(len(panels))
     figure.suptitle(title)
-    axes = figure.subplots(len(panels), 1, sharex=True, squeeze=False)[:, 0]
     for axis, panel in zip(axes, panels, strict=True):
         if panel == "tilt":
             for (label, (time, error)), colour in zip(errors.items(), COLOURS, strict=False):
@@ -43,11 +44,85 @@ def attitude_figure(
             axis.set_ylim(bottom=0)
         else:
             _signal_panel(axis, panel, truth, estimates)
+    return _finished(figure, axes)
+
+
+def direction_figure(truth: Trajectory, estimates: Mapping[str, Trajectory]) -> Figure:
+    """Roll, pitch and yaw of truth and estimates over time; the up vector's components if no estimate has a roll."""
+    angles = [name for name in ("roll", "pitch", "yaw") if any(name in e.values for e in estimates.values())]
+    if angles:
+        figure, axes = _panels(len(angles))
+        for axis, name in zip(axes, angles, strict=True):
+            _signal_panel(axis, name, truth, estimates)
+    else:
+        figure, axes = component_figure("vertical", "up, {} (1)", truth, estimates)
+    return _finished(figure, axes)
+
+
+def acceleration_figure(truth: Trajectory, estimates: Mapping[str, Trajectory]) -> Figure | None:
+    """External acceleration, truth and estimates, along each axis of the sensor; None where no estimate has one."""
+    with_one = {label: e for label, e in estimates.items() if "external_acceleration" in e.values}
+    if not with_one or "external_acceleration" not in truth.values:
+        return None
+    return _finished(*component_figure("external_acceleration", "{} (m/s²)", truth, with_one))
+
+
+def component_figure(
+    name: str, label: str, truth: Trajectory, estimates: Mapping[str, Trajectory]
+) -> tuple[Figure, list[Axes]]:
+    """One panel per component of a vector. label: of an axis, with a place for the component."""
+    figure, axes = _panels(3)
+    for k, axis in enumerate(axes):
+        axis.plot(truth.time, truth[name][:, k], color=TRUTH_COLOUR, linewidth=2.0, label="truth")
+        for (estimator, estimate), colour in zip(estimates.items(), COLOURS, strict=False):
+            axis.plot(estimate.time, estimate[name][:, k], color=colour, linewidth=1.0, label=estimator)
+        axis.set_ylabel(label.format("xyz"[k]))
+    return figure, axes
+
+
+def error_figure(estimates: Mapping[str, Trajectory], errors: Mapping[str, Signals]) -> Figure:
+    """Tilt error of every estimator over time, its own one-sigma tilt_std as a band; then how far its heading drifts.
+
+    The heading counts from the first sample: without a magnetometer only that can be known.
+    """
+    headings = [label for label, error in errors.items() if "heading" in error]
+    figure, axes = _panels(len(errors) + bool(headings))
+    colours = dict(zip(errors, COLOURS, strict=False))
+    for axis, (label, error) in zip(axes, errors.items(), strict=False):
+        estimate = estimates[label]
+        if "tilt_std" in estimate.values:
+            sigma = np.rad2deg(estimate["tilt_std"])
+            axis.fill_between(estimate.time, 0, sigma, color=colours[label], alpha=0.2, linewidth=0)
+            axis.plot([], [], color=colours[label], alpha=0.3, linewidth=6, label=f"{label}: tilt_std, one sigma")
+        axis.plot(estimate.time, np.rad2deg(error["tilt"]), color=colours[label], linewidth=1.2, label=label)
+        axis.set_ylabel("tilt error (deg)")
+        axis.set_ylim(0, 1.05 * max(np.rad2deg(error["tilt"]).max(), 1e-6))
+    for label in headings:
+        drift = metrics.angle_difference(errors[label]["heading"], errors[label]["heading"][0])
+        axes[-1].plot(estimates[label].time, _shown("heading", drift), color=colours[label], linewidth=1.2)
+        axes[-1].set_ylabel("heading error\nsince the start (deg)")
+    return _finished(figure, axes)
+
+
+def _panels(count: int) -> tuple[Figure, list[Axes]]:
+    """A figure with panels of one time axis."""
+    figure = Figure(figsize=(10, 0.8 + 2.3 * count), layout="constrained")
+    return figure, list(figure.subplots(count, 1, sharex=True, squeeze=False)[:, 0])
+
+
+def _finished(figure: Figure, axes: list[Axes]) -> Figure:
+    """The figure with grid, time axis and one legend."""
+    for axis in axes:
         axis.grid(alpha=0.3)
     axes[-1].set_xlabel("time (s)")
-    lines = {str(line.get_label()): line for axis in axes for line in axis.get_lines()}
-    figure.legend(lines.values(), lines.keys(), loc="outside lower center", ncols=len(lines))
+    lines = {str(line.get_label()): line for axis in axes for line in axis.get_lines() if not _unnamed(line)}
+    figure.legend(lines.values(), lines.keys(), loc="outside lower center", ncols=min(len(lines), 5))
     return figure
+
+
+def _unnamed(line: Line2D) -> bool:
+    """Matplotlib marks a line without a label so."""
+    return str(line.get_label()).startswith("_")
 
 
 def _signal_panel(axis: Axes, name: str, truth: Trajectory | None, estimates: Mapping[str, Trajectory]) -> None:

@@ -9,7 +9,8 @@ from ..cosim.replay import Replay
 from ..running import Trajectory
 from . import metrics
 from .figures import attitude_figure, save
-from .report import Section, Table, write_report
+from .report import Table
+from .run_report import write_run_report
 from .systems import comparisons
 from .tables import range_table, summary_table
 
@@ -27,24 +28,17 @@ def present_run(result: Result, figure: Path | None = None, report: Path | None 
                 f"{result.system}: no figure: the system has no plant with a truth and estimator to compare"
             )
         return range_table(dict(result.columns), {name: unit or "" for name, unit in result.units.items()})
-    table = summary_table("estimator", {c.component: c.summary for c in found})
-    drawn = attitude_figure(
-        result.system,
-        found[0].truth,
-        {c.component: c.estimate for c in found},
-        {c.component: (c.estimate.time, c.errors) for c in found},
-    )
     if figure:
+        drawn = attitude_figure(
+            result.system,
+            found[0].truth,
+            {c.component: c.estimate for c in found},
+            {c.component: (c.estimate.time, c.errors) for c in found},
+        )
         save(drawn, figure)
     if report:
-        seconds = result.time[-1] - result.time[0]
-        sections = [
-            Section("Errors", "Against the plant's truth, at the instants of the samples.", table),
-            Section("Run", figure=drawn, caption="Truth and estimates; tilt error; norm of the external acceleration."),
-            *([Section("Notes", "; ".join(result.notes))] if result.notes else []),
-        ]
-        write_report(report, result.system, f"Co-simulation of FMUs over {seconds:g} s.", sections)
-    return table
+        write_run_report(report, result, found)
+    return summary_table("estimator", {c.component: c.summary for c in found})
 
 
 def present_replay(replay: Replay, figure: Path | None = None) -> Table:

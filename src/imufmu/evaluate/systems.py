@@ -6,6 +6,7 @@ a plant and tells the truth.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,7 +23,8 @@ class Comparison:
     """Truth and estimates of one run at the estimators' own instants.
 
     truth, estimate: trajectories with equal time. errors: over time, as metrics.errors gives them. summary: figures by
-    name with the unit in the name.
+    name with the unit in the name. delay: s, from the instant of a sample to the row that first holds its outputs, in
+    the mean.
     """
 
     component: str
@@ -30,18 +32,25 @@ class Comparison:
     estimate: Trajectory
     errors: dict[str, np.ndarray]
     summary: dict[str, float]
+    delay: float
 
 
 def comparisons(result: Result) -> list[Comparison]:
     """One comparison per estimator; empty without a truth or an estimator. Raises ValueError with two truths."""
-    knowing = [name.removesuffix(".vertical[1]") for name in result.names if name.endswith(".vertical[1]")]
-    estimators = [component for component in knowing if f"{component}.sample_time" in result.names]
-    plants = [component for component in knowing if component not in estimators]
+    plants, estimators = knowing(result.names)
     if not plants or not estimators:
         return []
     if len(plants) > 1:
         raise ValueError(f"the system has several plants ({', '.join(plants)}): which one tells the truth is unclear")
     return [_compare(result, plants[0], component) for component in estimators]
+
+
+def knowing(names: Iterable[str]) -> tuple[list[str], list[str]]:
+    """Plants that tell the truth and estimators among the components with these variables, in their order."""
+    known = list(names)
+    attitudes = [name.removesuffix(".vertical[1]") for name in known if name.endswith(".vertical[1]")]
+    estimators = [component for component in attitudes if f"{component}.sample_time" in known]
+    return [component for component in attitudes if component not in estimators], estimators
 
 
 def _compare(result: Result, plant: str, component: str) -> Comparison:
@@ -54,7 +63,12 @@ def _compare(result: Result, plant: str, component: str) -> Comparison:
     errors = metrics.errors(at_samples, true_then)
     time = result.time[rows]
     return Comparison(
-        component, Trajectory(time, true_then), Trajectory(time, at_samples), errors, metrics.summary(errors)
+        component,
+        Trajectory(time, true_then),
+        Trajectory(time, at_samples),
+        errors,
+        metrics.summary(errors),
+        float(np.mean(result.time[rows_hat] - at_samples["sample_time"])),
     )
 
 

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from .report import Table
+from .systems import Comparison
 
 _SHOWN = {
     "roll_rmse_deg": "roll RMSE (deg)",
@@ -26,6 +27,14 @@ def summary_table(first_column: str, summaries: Mapping[str, Mapping[str, float]
         for label, summary in summaries.items()
     ]
     return Table([first_column, *(_SHOWN[name] for name in figures)], rows)
+
+
+def run_table(compared: Sequence[Comparison]) -> Table:
+    """Errors and delay of every estimator of a run."""
+    errors = summary_table("estimator", {c.component: c.summary for c in compared})
+    columns = [*errors.columns, "tilt 95th percentile (deg)", "delay (ms)"]
+    further = [[f"{c.summary['tilt_p95_deg']:.3f}", f"{1e3 * c.delay:.3f}"] for c in compared]
+    return Table(columns, [[*row, *more] for row, more in zip(errors.rows, further, strict=True)])
 
 
 def range_table(columns: Mapping[str, np.ndarray], units: Mapping[str, str]) -> Table:

@@ -136,13 +136,14 @@ def output(x: SimpleNamespace, u: SimpleNamespace, p: SimpleNamespace, t: Any) -
 def truth_on_link(link: Any, distance: Any, motion: tuple[Any, Any, Any], p: SimpleNamespace, t: Any) -> Expressions:
     """Truth of a sensor on this link (1 to n), at this distance (m) from its joint."""
     theta, rate, _ = motion
-    r_H, v_H, a_H = along(partial(chain_end, arms=arms_to(link, distance, p)), *motion)
+    place = along(partial(chain_end, arms=arms_to(link, distance, p)), *motion)
+    r_N, v_N, a_N = (in_N(derivative, p) for derivative in place)
     up_to_sensor = ca.SX(range(1, theta.numel() + 1)) <= link
     phi, phi_rate = ca.dot(up_to_sensor, theta), ca.dot(up_to_sensor, rate)
     q_LS = quaternion_from_euler(*ca.vertsplit(p.mount))
     q_NL = quaternion_from_euler(0, -phi, p.heading)  # of half angles: continuous however often the link goes round
     w_S = rotate_back(q_LS, ca.vertcat(0, -phi_rate, 0))
-    return truth(multiply(q_NL, q_LS), w_S, *(in_N(a, p) for a in (r_H, v_H, a_H)), p.g, magnetic_field(t, p))
+    return truth(multiply(q_NL, q_LS), w_S, r_N, v_N, a_N, p.g, magnetic_field(t, p))
 
 
 def in_N(plane: Any, p: SimpleNamespace) -> Any:

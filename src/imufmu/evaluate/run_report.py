@@ -1,0 +1,46 @@
+"""The report of a run: the motion, truth and estimates, errors, external acceleration."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from ..cosim import Result
+from .bodies import body_of
+from .figures import acceleration_figure, direction_figure, error_figure
+from .motion_figures import caption, motion_figure
+from .report import Section, write_report
+from .systems import Comparison
+from .tables import run_table
+
+
+def write_run_report(path: Path, result: Result, compared: Sequence[Comparison]) -> None:
+    """Write the HTML page of a run with at least one comparison. Raises WriteError."""
+    seconds = result.time[-1] - result.time[0]
+    lead = f"Co-simulation of FMUs over {seconds:g} s: {', '.join(c.component for c in compared)} against the truth."
+    write_report(path, result.system, lead, _sections(result, compared))
+
+
+def _sections(result: Result, compared: Sequence[Comparison]) -> list[Section]:
+    body, truth = body_of(result), compared[0].truth
+    estimates = {c.component: c.estimate for c in compared}
+    sections = [Section("Errors and delay", _ERRORS, run_table(compared))]
+    if body is not None:
+        sections.append(Section("Motion", figure=motion_figure(body), caption=caption(body)))
+    directions = direction_figure(truth, estimates)
+    sections.append(Section("Truth and estimates", figure=directions, caption="Attitude of the sensor."))
+    errors = error_figure(estimates, {c.component: c.errors for c in compared})
+    sections.append(Section("Errors over time", _BAND, figure=errors, caption="Errors at the instants of the samples."))
+    acceleration = acceleration_figure(truth, estimates)
+    if acceleration is not None:
+        shown = "Acceleration without gravity along the axes of the sensor."
+        sections.append(Section("External acceleration", figure=acceleration, caption=shown))
+    return [*sections, *([Section("Notes", points=result.notes)] if result.notes else [])]
+
+
+_ERRORS = (
+    "Root mean square, largest and 95th percentile of the errors against the plant's truth, at the instants of the "
+    "samples. Delay: from the instant of a sample to the row of results that first holds its outputs, in the mean; "
+    "it is no part of the errors."
+)
+_BAND = "A band is the estimator's own one-sigma tilt, where it states one."
