@@ -173,7 +173,8 @@ def run(
     skeleton.
     """
     from .cosim import System, locate, simulate
-    from .evaluate.present import animate, check_pictures, present_run, recorded
+    from .evaluate.bodies import recorded
+    from .evaluate.present import animate, check_pictures, present_run
 
     check_target(output, ".csv", ".h5")
     check_target(report, ".html")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -67,17 +66,13 @@ def body_of(result: Result) -> Body | None:
     plants, _ = knowing(result.names)
     for plant in plants:
         if f"{plant}.position" in result:
-            axes = _axes(result[f"{plant}.q_NS"]) if f"{plant}.q_NS" in result else None
-            skeleton = result[f"{plant}.skeleton"] if f"{plant}.skeleton" in result else None
-            return Body(result.time, result[f"{plant}.position"], axes, skeleton)
+            known = {name: result[f"{plant}.{name}"] for name in ("q_NS", "skeleton") if f"{plant}.{name}" in result}
+            axes = over_rows(matrix_from_quaternion, known["q_NS"]).reshape(-1, 3, 3) if "q_NS" in known else None
+            return Body(result.time, result[f"{plant}.position"], axes, known.get("skeleton"))
     return None
 
 
-def _axes(q_NS: np.ndarray) -> np.ndarray:
-    return over_rows(matrix_from_quaternion, q_NS).reshape(-1, 3, 3)
-
-
-def drawn(system: System) -> list[str]:
+def recorded(system: System) -> list[str]:
     """Names of what a run has to record to be drawn: every output, and the points of the bodies."""
     return [
         f"{name}.{variable.name}"
@@ -85,18 +80,3 @@ def drawn(system: System) -> list[str]:
         for variable in interface.variables.values()
         if variable.type != "String" and (variable.causality == "output" or variable.name.startswith("skeleton["))
     ]
-
-
-def check_drawable(names: Iterable[str], system: str) -> None:
-    """Raises ValueError where a system with these variables has nothing to compare: no plant or no estimator."""
-    plants, estimators = knowing(names)
-    missing = [
-        what
-        for what, found in (
-            ("plant that knows the truth (an output vertical[1..3] without sample_time)", plants),
-            ("estimator (outputs vertical[1..3] and sample_time)", estimators),
-        )
-        if not found
-    ]
-    if missing:
-        raise ValueError(f"{system}: nothing to draw: the system has no {', and no '.join(missing)}")

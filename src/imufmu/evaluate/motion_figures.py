@@ -16,7 +16,7 @@ from .figures import TRUTH_COLOUR
 POSTURES = 9  # instants at which the body is drawn
 SWEEP = 1.0  # of its own size: how far the fastest point of a body in its place goes while it is drawn
 LEAST_DRAWN = 0.06  # of the path: a smaller travelling body is drawn enlarged
-AXIS_COLOURS = {"x": "#d1495b", "y": "#6a994e", "z": "#2e86ab"}  # of the sensor
+AXIS_COLOURS = {"x": "#e07a1f", "y": "#2a9d8f", "z": "#7b5ea7"}  # of the sensor
 _TIME_COLOURS = colormaps["viridis"]
 _PATH = "#b4bec8"
 

@@ -4,15 +4,47 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from ..cosim import Result
+from ..cosim import Result, System
 from ..cosim.replay import Replay
 from ..running import Trajectory
-from . import metrics
+from . import animation, metrics
+from .bodies import body_of
 from .figures import attitude_figure, save
+from .movies import check_movie
 from .report import Table
 from .run_report import write_run_report
-from .systems import comparisons
+from .systems import comparisons, knowing
 from .tables import range_table, summary_table
+
+
+def check_pictures(system: System, figure: bool, report: Path | None, movie: Path | None) -> None:
+    """Raises ValueError where a run of this system cannot be drawn as asked, before it is run."""
+    if not (figure or report or movie):
+        return
+    names = [f"{name}.{variable}" for name, found in system.interfaces.items() for variable in found.variables]
+    plants, estimators = knowing(names)
+    for found, what in (
+        (plants, "no plant that knows the truth (outputs vertical[1..3], and no sample_time)"),
+        (estimators, "no estimator (outputs vertical[1..3] and sample_time)"),
+    ):
+        if not found:
+            raise ValueError(f"{system.description.name}: nothing to draw: the system has {what}")
+    if movie:
+        check_movie(movie)
+        for name in ("position[1]", "q_NS[1]"):
+            if f"{plants[0]}.{name}" not in names:
+                raise ValueError(f"{system.description.name}: cannot animate: {plants[0]} has no output {name}")
+
+
+def animate(result: Result, path: Path, progress: animation.Progress | None = None) -> list[str]:
+    """Write a moving picture of a run of a system that ``check_pictures`` let pass, recorded with ``recorded``.
+
+    Returns notes. Raises WriteError, and ValueError where the picture cannot be written.
+    """
+    body = body_of(result)
+    if body is None or body.axes is None:
+        raise ValueError(f"{result.system}: cannot animate: no plant tells position and q_NS")
+    return animation.animate(path, result.system, body, comparisons(result), progress)
 
 
 def present_run(result: Result, figure: Path | None = None, report: Path | None = None) -> Table:
