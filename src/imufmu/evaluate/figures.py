@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 
 from ..files import atomic_write
 from ..running import Trajectory
@@ -17,6 +16,7 @@ from . import metrics
 from .metrics import Signals
 
 _DPI = 100
+STEEPEST = np.deg2rad(80)  # pitch up to which roll and yaw are good to look at
 TRUTH_COLOUR = "#26323f"
 COLOURS = ("#d1495b", "#2e86ab", "#6a994e", "#edae49", "#7b5ea7", "#8d6b4f")
 
@@ -48,15 +48,18 @@ def attitude_figure(
 
 
 def direction_figure(truth: Trajectory, estimates: Mapping[str, Trajectory]) -> Figure:
-    """Roll, pitch and yaw of truth and estimates over time; the up vector's components if no estimate has a roll."""
-    angles = [name for name in ("roll", "pitch", "yaw") if any(name in e.values for e in estimates.values())]
-    if angles:
+    """Roll, pitch and yaw of truth and estimates over time, or the up vector where those say less.
+
+    That is where an estimate has no angles, and where the true pitch comes near +-90 deg: there roll and yaw jump.
+    """
+    every = [truth, *estimates.values()]
+    if all({"roll", "pitch"} <= e.values.keys() for e in every) and np.abs(truth["pitch"]).max() < STEEPEST:
+        angles = [name for name in ("roll", "pitch", "yaw") if any(name in e.values for e in estimates.values())]
         figure, axes = _panels(len(angles))
         for axis, name in zip(axes, angles, strict=True):
             _signal_panel(axis, name, truth, estimates)
-    else:
-        figure, axes = component_figure("vertical", "up, {} (1)", truth, estimates)
-    return _finished(figure, axes)
+        return _finished(figure, axes)
+    return _component_figure("vertical", "up vector, {} (1)", truth, estimates)
 
 
 def acceleration_figure(truth: Trajectory, estimates: Mapping[str, Trajectory]) -> Figure | None:
@@ -64,12 +67,10 @@ def acceleration_figure(truth: Trajectory, estimates: Mapping[str, Trajectory]) 
     with_one = {label: e for label, e in estimates.items() if "external_acceleration" in e.values}
     if not with_one or "external_acceleration" not in truth.values:
         return None
-    return _finished(*component_figure("external_acceleration", "{} (m/s²)", truth, with_one))
+    return _component_figure("external_acceleration", "{} (m/s²)", truth, with_one)
 
 
-def component_figure(
-    name: str, label: str, truth: Trajectory, estimates: Mapping[str, Trajectory]
-) -> tuple[Figure, list[Axes]]:
+def _component_figure(name: str, label: str, truth: Trajectory, estimates: Mapping[str, Trajectory]) -> Figure:
     """One panel per component of a vector. label: of an axis, with a place for the component."""
     figure, axes = _panels(3)
     for k, axis in enumerate(axes):
@@ -77,7 +78,7 @@ def component_figure(
         for (estimator, estimate), colour in zip(estimates.items(), COLOURS, strict=False):
             axis.plot(estimate.time, estimate[name][:, k], color=colour, linewidth=1.0, label=estimator)
         axis.set_ylabel(label.format("xyz"[k]))
-    return figure, axes
+    return _finished(figure, axes)
 
 
 def error_figure(estimates: Mapping[str, Trajectory], errors: Mapping[str, Signals]) -> Figure:
@@ -89,19 +90,20 @@ def error_figure(estimates: Mapping[str, Trajectory], errors: Mapping[str, Signa
     figure, axes = _panels(len(errors) + bool(headings))
     colours = dict(zip(errors, COLOURS, strict=False))
     for axis, (label, error) in zip(axes, errors.items(), strict=False):
-        estimate = estimates[label]
+        estimate, tilt = estimates[label], np.rad2deg(error["tilt"])
+        axis.plot(estimate.time, tilt, color=colours[label], linewidth=1.2, label=label)
         if "tilt_std" in estimate.values:
             sigma = np.rad2deg(estimate["tilt_std"])
-            axis.fill_between(estimate.time, 0, sigma, color=colours[label], alpha=0.2, linewidth=0)
-            axis.plot([], [], color=colours[label], alpha=0.3, linewidth=6, label=f"{label}: tilt_std, one sigma")
-        axis.plot(estimate.time, np.rad2deg(error["tilt"]), color=colours[label], linewidth=1.2, label=label)
+            axis.fill_between(estimate.time, sigma, color=colours[label], alpha=0.2, linewidth=0, label="its tilt_std")
         axis.set_ylabel("tilt error (deg)")
-        axis.set_ylim(0, 1.05 * max(np.rad2deg(error["tilt"]).max(), 1e-6))
+        axis.set_ylim(0, 1.05 * max(tilt.max(), 1e-6))
     for label in headings:
         drift = metrics.angle_difference(errors[label]["heading"], errors[label]["heading"][0])
-        axes[-1].plot(estimates[label].time, _shown("heading", drift), color=colours[label], linewidth=1.2)
+        axes[-1].plot(estimates[label].time, _shown("heading", drift), color=colours[label], linewidth=1.2, label=label)
         axes[-1].set_ylabel("heading error\nsince the start (deg)")
-    return _finished(figure, axes)
+    for axis in axes:
+        axis.legend(loc="lower left", bbox_to_anchor=(0, 1), ncols=2 + len(headings), fontsize="small", frameon=False)
+    return _time_axis(figure, axes)
 
 
 def _panels(count: int) -> tuple[Figure, list[Axes]]:
@@ -112,17 +114,16 @@ def _panels(count: int) -> tuple[Figure, list[Axes]]:
 
 def _finished(figure: Figure, axes: list[Axes]) -> Figure:
     """The figure with grid, time axis and one legend."""
+    lines = {str(line.get_label()): line for axis in axes for line in axis.get_lines()}
+    figure.legend(lines.values(), lines.keys(), loc="outside lower center", ncols=len(lines))
+    return _time_axis(figure, axes)
+
+
+def _time_axis(figure: Figure, axes: list[Axes]) -> Figure:
     for axis in axes:
         axis.grid(alpha=0.3)
     axes[-1].set_xlabel("time (s)")
-    lines = {str(line.get_label()): line for axis in axes for line in axis.get_lines() if not _unnamed(line)}
-    figure.legend(lines.values(), lines.keys(), loc="outside lower center", ncols=min(len(lines), 5))
     return figure
-
-
-def _unnamed(line: Line2D) -> bool:
-    """Matplotlib marks a line without a label so."""
-    return str(line.get_label()).startswith("_")
 
 
 def _signal_panel(axis: Axes, name: str, truth: Trajectory | None, estimates: Mapping[str, Trajectory]) -> None:

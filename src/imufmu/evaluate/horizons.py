@@ -79,15 +79,13 @@ def instruments(figure: Figure, compared: Sequence[Comparison], colours: Sequenc
     """One instrument per estimator, in a column at the right of the figure; in two where they are many."""
     columns = 1 if len(compared) <= 3 else 2
     rows = -(-len(compared) // columns)
-    width, height = 0.32 / columns, min(0.44, 0.9 / rows)
-    return [
-        Instrument(
-            figure.add_axes((0.67 + i % columns * width, 0.92 - (i // columns + 1) * height, width, 0.78 * height)),
-            of,
-            colour,
-        )
-        for i, (of, colour) in enumerate(zip(compared, colours, strict=False))
-    ]
+    width, height = 0.33 / columns, min(0.46, 0.97 / rows)
+    made = []
+    for i, (of, colour) in enumerate(zip(compared, colours, strict=False)):
+        left, bottom = 0.67 + i % columns * width, 0.98 - (i // columns + 1) * height
+        # Room for the name above and the error below.
+        made.append(Instrument(figure.add_axes((left, bottom + 0.06, width, height - 0.11)), of, colour))
+    return made
 
 
 def _on_rim(angles: np.ndarray) -> np.ndarray:

@@ -37,7 +37,8 @@ def motion_figure(body: Body) -> Figure:
     shown = body.time if body.travels else body.time[rows]
     colours = ScalarMappable(Normalize(shown[0], shown[-1]), _TIME_COLOURS)
     _path(axis, body, views, colours)
-    _postures(axis, body.between(rows), views, colours, body.size * enlargement(body))
+    length = body.size if body.skeleton is None else 0.14 * body.size * enlargement(body)
+    _postures(axis, body.between(rows), views, colours, enlargement(body), length)
     axis.set_aspect("equal", adjustable="datalim")
     axis.grid(alpha=0.3)
     axis.margins(0.08)
@@ -90,20 +91,21 @@ def _path(axis: Axes, body: Body, views: np.ndarray, colours: ScalarMappable) ->
         axis.plot(*path.T, color=_PATH, linewidth=0.8, label="path of the sensor", zorder=1)
 
 
-def _postures(axis: Axes, body: Body, views: np.ndarray, colours: ScalarMappable, size: float) -> None:
-    """The body, enlarged to this size (m), its sensor and the sensor's axes."""
+def _postures(
+    axis: Axes, body: Body, views: np.ndarray, colours: ScalarMappable, times: int, axis_length: float
+) -> None:
+    """The body, this many times as large, its sensor and the sensor's axes of this length (m)."""
     sensor, last = body.position @ views.T, len(body.time) - 1
     if body.skeleton is not None:
-        around = (body.skeleton - body.position[:, None, :]) * (size / body.size) + body.position[:, None, :]
-        for i, shade in enumerate(colours.to_rgba(body.time)):
-            label = "body" if i == last else None
-            axis.plot(*(around[i] @ views.T).T, color=shade, linewidth=1.8, label=label, solid_joinstyle="round")
+        place = body.position[:, None, :]
+        for i, bones in enumerate((place + times * (body.skeleton - place)) @ views.T):
+            shade, label = colours.to_rgba(body.time[i]), "body" if i == last else None
+            axis.plot(*bones.T, color=shade, linewidth=1.8, label=label, solid_joinstyle="round")
     axis.plot(*sensor.T, "s", color=TRUTH_COLOUR, markersize=3.5, label="sensor", zorder=4)
     if body.axes is None:
         return
-    length = size if body.skeleton is None else 0.14 * size
     for k, (name, colour) in enumerate(AXIS_COLOURS.items()):
-        ends = (body.position + length * body.axes[:, :, k]) @ views.T
+        ends = (body.position + axis_length * body.axes[:, :, k]) @ views.T
         for i in range(last + 1):
             label = f"sensor's {name} axis" if i == last else None
             axis.plot(*np.stack([sensor[i], ends[i]]).T, color=colour, linewidth=1.8, label=label, zorder=3)

@@ -15,7 +15,7 @@ from PIL import Image
 from ..files import atomic_write
 
 GIF, MP4 = ".gif", ".mp4"
-_COLOURS = 64  # of the palette that all frames of a GIF share
+_COLOURS = 256  # of the palette that all frames of a GIF share
 
 
 def check_movie(path: Path) -> None:
@@ -47,7 +47,7 @@ def _write_gif(path: Path, figure: Figure, frames: Iterable[object], rate: int) 
     for _ in frames:
         canvas.draw()
         picture = Image.fromarray(np.asarray(canvas.buffer_rgba())[..., :3])
-        palette = palette or picture.quantize(_COLOURS)
+        palette = palette or picture.quantize(_COLOURS, Image.Quantize.MAXCOVERAGE)
         images.append(picture.quantize(palette=palette, dither=Image.Dither.NONE))
     images[0].save(path, save_all=True, append_images=images[1:], duration=1000 // rate, loop=0, optimize=False)
 

@@ -17,7 +17,7 @@ from .tables import run_table
 def write_run_report(path: Path, result: Result, compared: Sequence[Comparison]) -> None:
     """Write the HTML page of a run with at least one comparison. Raises WriteError."""
     seconds = result.time[-1] - result.time[0]
-    lead = f"Co-simulation of FMUs over {seconds:g} s: {', '.join(c.component for c in compared)} against the truth."
+    lead = f"Co-simulation of FMUs over {seconds:.4g} s: {', '.join(c.component for c in compared)} against the truth."
     write_report(path, result.system, lead, _sections(result, compared))
 
 
@@ -28,7 +28,13 @@ def _sections(result: Result, compared: Sequence[Comparison]) -> list[Section]:
     if body is not None:
         sections.append(Section("Motion", figure=motion_figure(body), caption=caption(body)))
     directions = direction_figure(truth, estimates)
-    sections.append(Section("Truth and estimates", figure=directions, caption="Attitude of the sensor."))
+    sections.append(
+        Section(
+            "Truth and estimates",
+            figure=directions,
+            caption="Attitude of the sensor: Z-Y-X angles, or where those jump, the components of the up vector.",
+        )
+    )
     errors = error_figure(estimates, {c.component: c.errors for c in compared})
     sections.append(Section("Errors over time", _BAND, figure=errors, caption="Errors at the instants of the samples."))
     acceleration = acceleration_figure(truth, estimates)
@@ -43,4 +49,4 @@ _ERRORS = (
     "samples. Delay: from the instant of a sample to the row of results that first holds its outputs, in the mean; "
     "it is no part of the errors."
 )
-_BAND = "A band is the estimator's own one-sigma tilt, where it states one."
+_BAND = "A band is the estimator's own one-sigma angle, tilt_std, where it states one."
