@@ -12,8 +12,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from imufmu import cli
+from imufmu.cosim.results import read_hdf5
 from imufmu.tables import write_csv
 
 
@@ -104,6 +106,29 @@ def test_run_compares_writes_and_says_where(imufmu, tmp_path):
     assert "data:image/png;base64," in page and 'src="http' not in page and "<script" not in page
 
 
+def test_run_animates_and_its_results_then_hold_the_body(imufmu, tmp_path):
+    code, text, errors = imufmu("run", "pendulum_swing_up", "--stop", 1, "--animate", "s.gif", "--output", "s.h5")
+    assert code == 0, errors
+    assert {p.name for p in tmp_path.iterdir()} == {"s.gif", "s.h5"}
+    assert text.count("wrote ") == 2
+    with Image.open(tmp_path / "s.gif") as picture:
+        assert picture.n_frames == 21
+    assert read_hdf5(tmp_path / "s.h5")["plant.skeleton"].shape[1:] == (2, 3)
+
+
+@pytest.mark.parametrize("option", [("--plot",), ("--report", "r.html"), ("--animate", "a.gif")], ids=lambda o: o[0])
+@pytest.mark.parametrize(
+    "component, fmu, missing", [("plant", "pendulum", "no estimator"), ("lee2012", "lee2012", "no plant that knows")]
+)
+def test_a_system_with_nothing_to_compare_is_not_drawn(imufmu, tmp_path, option, component, fmu, missing):
+    (tmp_path / "alone.ssd").write_text(ALONE.format(component=component, fmu=fmu))
+    code, text, errors = imufmu("run", "alone.ssd", *option)
+    assert code == 2
+    assert missing in errors and "Traceback" not in errors and not text
+    assert [path.name for path in tmp_path.iterdir()] == ["alone.ssd"]
+    assert imufmu("run", "alone.ssd")[0] == 0  # without pictures it runs
+
+
 def test_replay_prints_errors_where_there_is_truth_and_writes_every_row(imufmu, tmp_path, walk):
     code, text, errors = imufmu("replay", walk, "--set", "c_a=0.2", "--output", "o.csv", "--plot")
     assert code == 0, errors
@@ -121,6 +146,14 @@ def test_demo_makes_a_figure_and_a_page(imufmu, tmp_path):
     assert str(tmp_path / "d" / "demo.html") in text
 
 
+ALONE = """<ssd:SystemStructureDescription xmlns:ssd="http://ssp-standard.org/SSP1/SystemStructureDescription"
+    version="1.0" name="alone">
+  <ssd:System name="Alone"><ssd:Elements>
+    <ssd:Component name="{component}" source="resources/{fmu}.fmu" type="application/x-fmu-sharedlibrary"/>
+  </ssd:Elements></ssd:System>
+  <ssd:DefaultExperiment startTime="0" stopTime="0.1"/>
+</ssd:SystemStructureDescription>"""
+
 WRONG = {
     "unknown command": (["walk"], "walk"),
     "unknown block": (["build", "lee2013"], "no block is called 'lee2013'"),
@@ -134,6 +167,8 @@ WRONG = {
     "no value": (["run", "pendulum_lee2012", "--set", "lee2012.c_a"], "expected NAME=VALUE"),
     "text for a number": (["run", "pendulum_lee2012", "--set", "lee2012.c_a=high"], "'high' is not a number"),
     "negative step": (["run", "pendulum_lee2012", "--step", "-0.1"], "steps of -0.1"),
+    "animation of another kind": (["run", "pendulum_lee2012", "--animate", "a.avi"], ".gif or .mp4"),
+    "animation into no folder": (["run", "pendulum_lee2012", "--animate", "none/a.gif"], "none"),
     "no such recording": (["replay", "none.csv"], "none.csv"),
     "not a recording": (["replay", "notes.txt"], "notes.txt"),
     "unknown estimator": (["replay", "{walk}", "-e", "lee2013"], "no estimator is called 'lee2013'"),

@@ -23,6 +23,7 @@ EXAMPLES = """IMU attitude estimators as drop-in FMUs, with the plants and IMU m
   imufmu info lee2012.fmu                       what is inside
   imufmu doctor lee2012.fmu                     whether and where it runs
   imufmu run pendulum_lee2012 --set lee2012.mode=3 --plot
+  imufmu run pendulum_swing_up --report swing_up.html --animate swing_up.gif
   imufmu replay walk.csv --estimator lee2012 --set c_a=0.2 --output tilt.csv
   imufmu pack pendulum_lee2012 pendulum.ssp     for other tools
   imufmu validate --junit verdict.xml           do the papers' conclusions hold?
@@ -58,6 +59,7 @@ def list_() -> None:
     \b
       imufmu list
     """
+    from .cosim.description import read_description
     from .locations import models_folder
     from .registry import ESTIMATORS, PLANTS, SENSORS
 
@@ -65,15 +67,9 @@ def list_() -> None:
         for block in blocks:
             out.print(f"{kind:10} {block.name:32} {block.summary}")
     for path in sorted(models_folder().rglob("*.ssd")):
-        out.print(f"{'system':10} {path.stem:32} {_description(path)}")
+        out.print(f"{'system':10} {path.stem:32} {read_description(path).description}")
     for path in sorted((models_folder() / "imus").glob("*.ssv")):
         out.print(f"{'device':10} {path.stem:32} parameter set of the sensor imu: {path}")
-
-
-def _description(path: Path) -> str:
-    from .cosim.description import read_description
-
-    return read_description(path).description
 
 
 @app.command()

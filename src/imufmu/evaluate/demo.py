@@ -51,7 +51,7 @@ def run_demo(folder: Path, progress: Callable[[int, int], None] | None = None) -
                 progress(before * ticks + tick, len(MODES) * ticks)
 
         result = simulate(system, parameters={"lee2012.mode": mode}, progress=overall)
-        (found[label],) = comparisons(result)
+        found[label] = next(c for c in comparisons(result) if c.component == "lee2012")
     table = summary_table("lee2012", {label: c.summary for label, c in found.items()})
     truth = next(iter(found.values())).truth
     figure = attitude_figure(
