@@ -23,12 +23,11 @@ from ...estimators.running_median import centred_median
 from ...plants.pendulum import DOUBLE_PENDULUM, DRIVEN
 from ...running import Trajectory, run
 from ..metrics import angle_difference, rms
-from .motions import Record, parameter_set, record
+from .motions import Record, parameter_set, read, record
 
 PERIOD = 0.005  # s, 200 Hz
 A1, A2 = 0.2, 0.35  # m, length of link 1, and joint 2 to sensor 2
 MOUNT = (0.0, np.pi / 2, np.pi / 2)  # turns the sensor of the pendulum into the frame of (8)
-COUNTS = 1000  # of an encoder, a turn
 REST, LEARNING = 3.0, 2.0  # s: at the start, and the part of it that gives the biases
 WARMING, DRIFT = 5.0, np.deg2rad(0.25)  # s, rad/s
 NOT_CALIBRATED = ("misalignment", "scale_error", "accel_bias")
@@ -101,19 +100,16 @@ def records(drive: Mapping[str, Any], seed: int) -> tuple[Record, Record]:
     duration = PERIOD * round((REST + drive["drive_duration"] + REST) / PERIOD)
     arm = {"motion": DRIVEN, "drive_rest": REST, "length": (A1, A2), "imu_distance": A2, "mount": MOUNT, **drive}
     arm["max_step"] = PERIOD  # the angles of a driven motion do not depend on it
-    first, second = (
-        record(DOUBLE_PENDULUM, duration, PERIOD, 2 * seed + link, {**arm, "imu_link": link}, imu_errors())
-        for link in (1, 2)
-    )
-    return first, second
+    second = record(DOUBLE_PENDULUM, duration, PERIOD, 2 * seed + 2, arm, imu_errors())
+    upper = {name: second.truth[f"upper_{name}"] for name in ("angular_velocity", "specific_force", "magnetic_field")}
+    return read(Trajectory(second.truth.time, upper), PERIOD, 2 * seed + 1, imu_errors()), second
 
 
 def trial(drive: Mapping[str, Any], seed: int) -> Trial:
     """The record of one seed, with the drift of the biases and the encoders."""
     first, second = records(drive, seed)
-    time = first.truth.time
-    count = 2 * np.pi / COUNTS
-    angle = (count * np.round(first.truth["angle"] / count)).sum(axis=1) - np.pi / 2
+    time = second.truth.time
+    angle = second.truth["encoder"].sum(axis=1) - np.pi / 2
     towards = np.random.default_rng([seed, 3]).choice([-1, 1], 2) * DRIFT
     drift = -np.expm1(-np.maximum(time - LEARNING, 0) / WARMING)[:, None]
     readings = {
