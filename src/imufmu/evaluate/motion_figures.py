@@ -23,17 +23,19 @@ _PATH = "#b4bec8"
 
 def motion_figure(body: Body) -> Figure:
     """Stick figure at several instants, or path with the body at intervals; metres, equal scales, time in colours."""
-    figure = Figure(figsize=(10, 6), layout="constrained")
-    axis = figure.add_subplot()
     if body.travels:
         rows = _evenly(np.arange(len(body.time)))
         views = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
-        axis.set(xlabel="East (m)", ylabel="North (m)")
+        names = "East (m)", "North (m)"
     else:
         rows = _evenly(lively(body))
         views = np.array([body.side, [0.0, 0.0, 1.0]])
         degrees = np.degrees(np.arctan2(body.side[1], body.side[0])) + 0.0
-        axis.set(xlabel=f"horizontal, {degrees:.0f} deg from East towards North (m)", ylabel="up (m)")
+        names = f"horizontal, {degrees:.0f} deg from East towards North (m)", "up (m)"
+    width, height = np.ptp(body.points @ views.T, axis=(0, 1)) + 1e-9
+    figure = Figure(figsize=(10, np.clip(2 + 7 * height / width, 3.5, 6.5)), layout="constrained")
+    axis = figure.add_subplot()
+    axis.set(xlabel=names[0], ylabel=names[1])
     shown = body.time if body.travels else body.time[rows]
     colours = ScalarMappable(Normalize(shown[0], shown[-1]), _TIME_COLOURS)
     _path(axis, body, views, colours)
