@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from drawn_runs import result_of
+from matplotlib import rc_context
 from matplotlib.figure import Figure
 from PIL import Image
 
@@ -210,6 +211,16 @@ def test_mp4_without_ffmpeg_says_what_to_do(monkeypatch: pytest.MonkeyPatch) -> 
     monkeypatch.setattr(movies.FFMpegWriter, "isAvailable", classmethod(lambda cls: False))
     with pytest.raises(ValueError, match=r"install ffmpeg or choose \.gif"):
         check_movie(Path("a.mp4"))
+
+
+@pytest.mark.skipif(not shutil.which("false"), reason="needs a program that fails")
+def test_an_ffmpeg_that_fails_is_one_clear_message_and_leaves_nothing(tmp_path: Path) -> None:
+    with (
+        rc_context({"animation.ffmpeg_path": "false"}),
+        pytest.raises(ValueError, match=r"ffmpeg failed.*choose \.gif"),
+    ):
+        write_movie(tmp_path / "a.mp4", Figure(figsize=(1, 1)), range(30), RATE)
+    assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.parametrize("name", ["a.avi", "a"])

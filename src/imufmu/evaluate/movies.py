@@ -61,4 +61,5 @@ def _write_mp4(path: Path, target: Path, figure: Figure, frames: Iterable[object
     except (subprocess.CalledProcessError, BrokenPipeError) as error:
         if isinstance(error.__context__, KeyboardInterrupt):  # Ctrl-C reaches ffmpeg too
             raise KeyboardInterrupt from None
-        raise ValueError(f"{target}: ffmpeg failed ({error}); choose {GIF}") from None
+        code = f" with exit code {error.returncode}" if isinstance(error, subprocess.CalledProcessError) else ""
+        raise ValueError(f"{target}: ffmpeg failed{code}; repair it or choose {GIF}") from None
