@@ -7,7 +7,7 @@ import pytest
 from drawn_runs import result_of, without
 
 from imufmu.cosim import System, locate
-from imufmu.evaluate.bodies import body_of, recorded
+from imufmu.evaluate.bodies import Body, body_of, recorded
 from imufmu.plants.handheld import BLOCK as HANDHELD
 from imufmu.plants.handheld import BOX
 from imufmu.plants.pendulum import DOUBLE_PENDULUM, PENDULUM
@@ -57,6 +57,16 @@ def test_a_pendulum_stays_and_is_seen_across_its_plane() -> None:
     assert not body.travels
     assert body.size == pytest.approx(1.0, abs=0.02)  # 1 m long; upright its height is all of it
     assert abs(body.side @ [np.cos(0.7), np.sin(0.7), 0.0]) == pytest.approx(1, abs=1e-9)
+
+
+def test_a_body_is_seen_across_the_direction_in_which_it_moves_and_at_rest_across_its_width() -> None:
+    time = np.arange(20.0)
+    forward = 0.2 * np.sin(time)[:, None] * [1.0, 0.0, 0.0]
+    wide = np.array([[0.0, -0.5, 0.0], [0.0, 0.5, 0.0]])
+    nodding = Body(time, forward, None, wide + forward[:, None, :])
+    still = Body(time, 0 * forward, None, np.tile(wide, (20, 1, 1)))
+    assert nodding.side == pytest.approx([1, 0, 0])
+    assert still.side == pytest.approx([0, 1, 0])
 
 
 def test_a_body_in_a_hand_travels() -> None:

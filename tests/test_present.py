@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from imufmu.cosim import Result
 from imufmu.evaluate.bodies import body_of
 from imufmu.evaluate.figures import acceleration_figure, direction_figure, error_figure
-from imufmu.evaluate.motion_figures import POSTURES, caption, enlargement, lively, motion_figure
+from imufmu.evaluate.motion_figures import POSTURES, enlargement, lively, path_figure, stick_figure
 from imufmu.evaluate.present import present_run
 from imufmu.evaluate.systems import comparisons
 from imufmu.evaluate.tables import run_table
@@ -42,7 +42,7 @@ def lines(figure: Figure, label: str) -> list[np.ndarray]:
 
 def test_the_stick_figure_is_the_skeleton_from_the_side_at_equal_times(swing: Result) -> None:
     body = body_of(swing)
-    axis = motion_figure(body).axes[0]
+    axis = stick_figure(body).axes[0]
     drawn = [np.asarray(line.get_xydata()) for line in axis.lines if len(line.get_xydata()) == 3]
     rows = lively(body)[np.linspace(0, len(lively(body)) - 1, POSTURES).round().astype(int)]
     expected = np.stack([body.skeleton[rows] @ body.side, body.skeleton[rows][:, :, 2]], axis=-1)
@@ -63,22 +63,25 @@ def test_what_is_drawn_of_a_swing_holds_its_fastest_instant(swing: Result) -> No
 def test_a_body_at_rest_is_drawn_once() -> None:
     body = body_of(result_of(PENDULUM, 0.5, motion=1))
     assert len(lively(body)) == 1
-    motion_figure(body)
+    assert {len(bones) for bones in lines(stick_figure(body), "body")} == {2}
 
 
 def test_the_path_of_a_traveller_is_seen_from_above_in_the_colours_of_time() -> None:
     drifting = {"bursts": 1, "burst_stop": (1.5, 0.0, 0.0, 0.0), "acceleration_mean": 10.0}
     body = body_of(result_of(HANDHELD, 10.0, **drifting))
-    axis = motion_figure(body).axes[0]
+    axis = path_figure(body).axes[0]
     (path,) = (c for c in axis.collections if isinstance(c, LineCollection))
     ends = np.array(path.get_segments())[:, 1]
     assert np.allclose(ends, body.position[1:, :2], rtol=0, atol=1e-12)
     assert (axis.get_xlabel(), axis.get_ylabel()) == ("East (m)", "North (m)")
-    assert enlargement(body) > 1 and f"drawn {enlargement(body)} times as large" in caption(body)
+    (drawn,) = (line[0] - body.position[-1, :2] for line in map(np.asarray, lines(path_figure(body), "body")))
+    assert enlargement(body) > 1
+    offset = (body.skeleton[-1, 0] - body.position[-1])[:2]
+    assert drawn == pytest.approx(enlargement(body) * offset, abs=1e-12)
 
 
 def test_a_plant_without_skeleton_is_a_path_with_the_sensors_axes(swing: Result) -> None:
-    figure = motion_figure(body_of(without(swing, "skeleton")))
+    figure = path_figure(body_of(without(swing, "skeleton")))
     assert {"sensor's x axis", "sensor's y axis", "sensor's z axis"} <= set(labels(figure))
     assert "body" not in labels(figure)
 
@@ -152,6 +155,13 @@ def test_the_report_goes_from_the_motion_to_the_errors(swing: Result, tmp_path: 
     page = (tmp_path / "r.html").read_text()
     assert page.count("data:image/png;base64,") == 4
     assert "<script" not in page and 'src="http' not in page
+
+
+def test_the_report_of_a_traveller_has_its_path_and_its_fastest_movement(tmp_path: Path) -> None:
+    present_run(result_of(HANDHELD, 10.0), report=tmp_path / "r.html")
+    page = (tmp_path / "r.html").read_text()
+    assert page.index("<h2>Motion") < page.index("<h3>Fastest movement") < page.index("<h2>Truth and estimates")
+    assert page.count("data:image/png;base64,") == 5
 
 
 def test_the_report_of_a_plant_without_position_leaves_the_motion_out(swing: Result, tmp_path: Path) -> None:

@@ -49,9 +49,11 @@ class Body:
 
     @cached_property
     def side(self) -> np.ndarray:
-        """Horizontal direction (3,) along which the body extends and moves most: the one to see from the side."""
-        horizontal = self.points[..., :2].reshape(-1, 2)
-        _, directions = np.linalg.eigh(np.cov(horizontal, rowvar=False))
+        """Horizontal direction (3,) along which the body moves most, at rest extends most: to be seen from the side."""
+        horizontal = self.points[..., :2]
+        moved = horizontal - horizontal.mean(axis=0)
+        spread = moved if moved.any() else horizontal - horizontal.mean(axis=(0, 1))
+        _, directions = np.linalg.eigh(np.einsum("nki,nkj->ij", spread, spread))
         x, y = directions[:, -1]
         return np.array([x, y, 0.0]) * (1 if x + 1e-9 * y >= 0 else -1)
 

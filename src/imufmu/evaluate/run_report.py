@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from ..cosim import Result
-from .bodies import body_of
+from .bodies import Body, body_of
 from .figures import acceleration_figure, direction_figure, error_figure
-from .motion_figures import caption, motion_figure
+from .motion_figures import enlargement, path_figure, stick_figure
 from .report import Section, write_report
 from .systems import Comparison
 from .tables import run_table
@@ -25,8 +25,7 @@ def _sections(result: Result, compared: Sequence[Comparison]) -> list[Section]:
     body, truth = body_of(result), compared[0].truth
     estimates = {c.component: c.estimate for c in compared}
     sections = [Section("Errors and delay", _ERRORS, run_table(compared))]
-    if body is not None:
-        sections.append(Section("Motion", figure=motion_figure(body), caption=caption(body)))
+    sections += _motion(body) if body is not None else []
     directions = direction_figure(truth, estimates)
     sections.append(
         Section(
@@ -42,6 +41,25 @@ def _sections(result: Result, compared: Sequence[Comparison]) -> list[Section]:
         shown = "Acceleration without gravity along the axes of the sensor."
         sections.append(Section("External acceleration", figure=acceleration, caption=shown))
     return [*sections, *([Section("Notes", points=result.notes)] if result.notes else [])]
+
+
+def _motion(body: Body) -> list[Section]:
+    """The path of a body that travels, or that has no skeleton; then the body from the side."""
+    sections = []
+    if body.travels:
+        times = enlargement(body)
+        bodily = (
+            f"the body{f', {times} times as large,' if times > 1 else ''} and " if body.skeleton is not None else ""
+        )
+        shown = f"Path of the sensor from above, with {bodily}the sensor's axes at equal times."
+        sections.append(Section("Motion", figure=path_figure(body), caption=shown))
+    if body.skeleton is not None:
+        where = "meanwhile" if body.travels else "in the whole run"
+        shown = f"The body from the side at equal times of its fastest movement; path of the sensor {where}."
+        level = 3 if sections else 2
+        heading = "Fastest movement" if sections else "Motion"
+        sections.append(Section(heading, figure=stick_figure(body), caption=shown, level=level))
+    return sections
 
 
 _ERRORS = (
