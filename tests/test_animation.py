@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import shutil
 from pathlib import Path
 
@@ -148,6 +149,23 @@ def test_the_window_follows_a_traveller_over_ground_that_stays() -> None:
         assert np.all(ground[:, 2] == body.skeleton[..., 2].min())
         offsets.append(ground[0, :2] / (scene.window.half / 4))
     assert np.allclose(offsets, np.round(offsets), rtol=0, atol=1e-9)  # dots at the same places in N
+
+
+def test_many_estimators_have_an_instrument_each_that_none_hides() -> None:
+    result = result_of(PENDULUM, 0.2)
+    estimate = {name: values for name, values in result.columns.items() if name.startswith("lee2012.")}
+    columns = dict(result.columns)
+    for i in range(7):
+        columns |= {name.replace("lee2012", f"filter{i}"): values for name, values in estimate.items()}
+    scene = scene_of(Result("many", result.time, columns, result.units))
+    scene.show(0.1)
+    places = [instrument.line.axes.get_position() for instrument in scene.instruments]
+    assert len(places) == len(scene.horizons) == 8
+    assert all(place.y0 > 0 and place.y1 < 1 and place.x1 <= 1 for place in places)
+    for one, other in itertools.combinations(places, 2):
+        across = min(one.x1, other.x1) - max(one.x0, other.x0)
+        along = min(one.y1, other.y1) - max(one.y0, other.y0)
+        assert min(across, along) < 1e-9  # beside or below each other
 
 
 # The files

@@ -10,6 +10,7 @@ Beside it one instrument per estimator, as in an aircraft: the horizon as the se
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from itertools import cycle, islice
 from math import floor, log10
 from pathlib import Path
 
@@ -86,9 +87,10 @@ class Scene:
         self.bones = axis.plot([], [], color=TRUTH_COLOUR, linewidth=2.5, solid_joinstyle="round")[0]
         self.axes = [axis.plot([], [], color=colour, linewidth=2.5)[0] for colour in AXIS_COLOURS.values()]
         self.true_horizon = axis.plot([], [], "--", color=TRUTH_COLOUR, linewidth=1.0)[0]
-        self.horizons = [axis.plot([], [], color=colour, linewidth=1.8)[0] for colour in COLOURS[: len(compared)]]
+        colours = [*islice(cycle(COLOURS), len(compared))]
+        self.horizons = [axis.plot([], [], color=colour, linewidth=1.8)[0] for colour in colours]
         _explain(axis, half)
-        self.instruments = instruments(self.figure, compared, COLOURS)
+        self.instruments = instruments(self.figure, compared, colours)
 
     def show(self, t: float) -> None:
         """Move everything to the time t (s): to the last row of the run, and the last sample, not after it."""
@@ -169,7 +171,7 @@ def _last(times: np.ndarray, t: float) -> int:
 def _explain(axis: Axes, half: float) -> None:
     """Scale bar and legend."""
     power = 10.0 ** floor(log10(0.5 * half))
-    length = max(step * power for step in (1, 2, 5) if step * power <= 0.5 * half)
+    length = max(step * power for step in (1, 2, 5) if step == 1 or step * power <= 0.5 * half)
     left, bottom = -0.94 * half, -0.9 * _SHAPE * half
     axis.plot([left, left + length], [bottom, bottom], color=TRUTH_COLOUR, linewidth=2)
     axis.text(left + length / 2, bottom + 0.03 * half, f"{length:g} m", ha="center", fontsize=8, color=TRUTH_COLOUR)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 from collections.abc import Mapping
+from itertools import cycle
 from pathlib import Path
 
 import numpy as np
@@ -38,7 +39,7 @@ def attitude_figure(
     figure.suptitle(title)
     for axis, panel in zip(axes, panels, strict=True):
         if panel == "tilt":
-            for (label, (time, error)), colour in zip(errors.items(), COLOURS, strict=False):
+            for (label, (time, error)), colour in zip(errors.items(), cycle(COLOURS), strict=False):
                 axis.plot(time, np.rad2deg(error["tilt"]), color=colour, linewidth=1.2, label=label)
             axis.set_ylabel("tilt error (deg)")
             axis.set_ylim(bottom=0)
@@ -75,7 +76,7 @@ def _component_figure(name: str, label: str, truth: Trajectory, estimates: Mappi
     figure, axes = _panels(3)
     for k, axis in enumerate(axes):
         axis.plot(truth.time, truth[name][:, k], color=TRUTH_COLOUR, linewidth=2.0, label="truth")
-        for (estimator, estimate), colour in zip(estimates.items(), COLOURS, strict=False):
+        for (estimator, estimate), colour in zip(estimates.items(), cycle(COLOURS), strict=False):
             axis.plot(estimate.time, estimate[name][:, k], color=colour, linewidth=1.0, label=estimator)
         axis.set_ylabel(label.format("xyz"[k]))
     return _finished(figure, axes)
@@ -88,7 +89,7 @@ def error_figure(estimates: Mapping[str, Trajectory], errors: Mapping[str, Signa
     """
     headings = [label for label, error in errors.items() if "heading" in error]
     figure, axes = _panels(len(errors) + bool(headings))
-    colours = dict(zip(errors, COLOURS, strict=False))
+    colours = dict(zip(errors, cycle(COLOURS), strict=False))
     for axis, (label, error) in zip(axes, errors.items(), strict=False):
         estimate, tilt = estimates[label], np.rad2deg(error["tilt"])
         axis.plot(estimate.time, tilt, color=colours[label], linewidth=1.2, label=label)
@@ -129,7 +130,7 @@ def _time_axis(figure: Figure, axes: list[Axes]) -> Figure:
 def _signal_panel(axis: Axes, name: str, truth: Trajectory | None, estimates: Mapping[str, Trajectory]) -> None:
     if truth is not None and name in truth.values:
         axis.plot(truth.time, _shown(name, truth[name]), color=TRUTH_COLOUR, linewidth=2.0, label="truth")
-    for (label, estimate), colour in zip(estimates.items(), COLOURS, strict=False):
+    for (label, estimate), colour in zip(estimates.items(), cycle(COLOURS), strict=False):
         if name in estimate.values:
             axis.plot(estimate.time, _shown(name, estimate[name]), color=colour, linewidth=1.0, label=label)
     axis.set_ylabel("external acceleration,\nnorm (m/s²)" if name == "external_acceleration" else f"{name} (deg)")

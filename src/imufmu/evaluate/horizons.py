@@ -81,7 +81,7 @@ def instruments(figure: Figure, compared: Sequence[Comparison], colours: Sequenc
     rows = -(-len(compared) // columns)
     width, height = 0.33 / columns, min(0.46, 0.97 / rows)
     made = []
-    for i, (of, colour) in enumerate(zip(compared, colours, strict=False)):
+    for i, (of, colour) in enumerate(zip(compared, colours, strict=True)):
         left, bottom = 0.67 + i % columns * width, 0.98 - (i // columns + 1) * height
         # Room for the name above and the error below.
         made.append(Instrument(figure.add_axes((left, bottom + 0.06, width, height - 0.11)), of, colour))

@@ -32,7 +32,7 @@ The envelope e rises from 0 to 1 and falls back with three continuous derivative
 amplitude <= |offset| a joint bends to one side only: a knee that never hyperextends.
 
 End stops, as the stick that keeps the knee from hyperextending in [1]. A joint that is d beyond its upper stop is
-pushed back by the contact law of [2],
+pushed back by the contact law of [2], with an exponent of 2,
 
     s = -k d^2 max(0, 1 + a d')                                                       (5)
 
@@ -43,11 +43,11 @@ Swing-up. A drive in the first joint moves the energy E = T + V to one aimed at 
 
     tau_1 = tau_max tanh(gain (E_aim - E) theta_1' / tau_max),  E_aim = V_hanging + r (V_upright - V_hanging)    (6)
 
-so that dE/dt = tau_1 theta_1' has the sign of E_aim - E. Above r = 1 the pendulum goes over the top again and again.
+so that its power tau_1 theta_1' has the sign of E_aim - E. Above r = 1 the pendulum goes over the top again and again.
 
 [1] Bennett, Jafari, Gans, Motion Based Acceleration Correction for Improved Sensor Orientation Estimates, BSN 2014
 [2] Hunt, Crossley, Coefficient of Restitution Interpreted as Damping in Vibroimpact, Journal of Applied Mechanics
-    42(2), 1975, doi:10.1115/1.3423596; here with the exponent 2
+    42(2), 1975, doi:10.1115/1.3423596
 [3] Astrom, Furuta, Swinging up a Pendulum by Energy Control, Automatica 36(2), 2000,
     doi:10.1016/S0005-1098(99)00140-5; here with a torque in place of the motion of the pivot
 """
