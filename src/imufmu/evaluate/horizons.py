@@ -50,7 +50,7 @@ def chord(angle: float, distance: float) -> np.ndarray:
 class Instrument:
     """One attitude indicator; ``show`` moves it to a sample."""
 
-    def __init__(self, axis: Axes, compared: Comparison, colour: str) -> None:
+    def __init__(self, axis: Axes, compared: Comparison, colour: str, font_size: float) -> None:
         self.compared = compared
         self.view = viewing_axes(compared.truth["vertical"])
         axis.set(xlim=(-1.1, 1.1), ylim=(-1.1, 1.1), aspect="equal")
@@ -63,7 +63,7 @@ class Instrument:
         axis.plot([-0.45, -0.15, 0, 0.15, 0.45], [0, 0, -0.12, 0, 0], color=MARK, linewidth=2.5)
         axis.add_patch(Circle((0, 0), 1, facecolor="none", edgecolor=colour, linewidth=2.5))
         axis.set_title(compared.component, fontsize=10, color=colour, pad=1)
-        self.text = axis.text(0, -1.1, "", fontsize=9, color=TRUTH_COLOUR, ha="center", va="top")
+        self.text = axis.text(0, -1.1, "", fontsize=font_size, color=TRUTH_COLOUR, ha="center", va="top")
 
     def show(self, row: int) -> None:
         """Horizons and error of this sample."""
@@ -83,8 +83,8 @@ def instruments(figure: Figure, compared: Sequence[Comparison], colours: Sequenc
     made = []
     for i, (of, colour) in enumerate(zip(compared, colours, strict=True)):
         left, bottom = 0.67 + i % columns * width, 0.98 - (i // columns + 1) * height
-        # Room for the name above and the error below.
-        made.append(Instrument(figure.add_axes((left, bottom + 0.06, width, height - 0.11)), of, colour))
+        axis = figure.add_axes((left, bottom + 0.06, width, height - 0.11))  # room for the name and the error
+        made.append(Instrument(axis, of, colour, 9 if columns == 1 else 7))
     return made
 
 
