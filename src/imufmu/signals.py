@@ -37,6 +37,7 @@ UNITS = {
         Unit("1", {}),
         Unit("s", {"s": 1}),
         Unit("Hz", {"s": -1}),
+        Unit("1/min", {"s": -1}, factor=1 / 60),
         Unit("m", {"m": 1}),
         Unit("m/s", {"m": 1, "s": -1}),
         Unit("m/s2", {"m": 1, "s": -2}),

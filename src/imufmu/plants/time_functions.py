@@ -23,6 +23,18 @@ def smooth_step(s: Any) -> Any:
     return s**4 * (35 - 84 * s + 70 * s**2 - 20 * s**3)
 
 
+def step_integral(s: Any) -> Any:
+    """Integral of ``smooth_step`` from 0 to s; s - 1/2 for s >= 1."""
+    inside = ca.fmin(ca.fmax(s, 0), 1)
+    return inside**5 * (7 - 14 * inside + 10 * inside**2 - 2.5 * inside**3) + ca.fmax(s - 1, 0)
+
+
+def step_double_integral(s: Any) -> Any:
+    """Integral of ``step_integral`` from 0 to s."""
+    inside, beyond = ca.fmin(ca.fmax(s, 0), 1), ca.fmax(s - 1, 0)
+    return inside**6 * (7 / 6 - 2 * inside + 5 / 4 * inside**2 - 5 / 18 * inside**3) + (beyond + beyond**2) / 2
+
+
 def windows(t: Any, count: Any, start: Any, stop: Any, ramp: Any) -> Any:
     """1 in the first ``count`` of the intervals, 0 outside, with three continuous derivatives.
 
