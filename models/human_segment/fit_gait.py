@@ -3,8 +3,8 @@
 Least squares over: the published key points (each over 2 deg); the point of the foot that carries (heel, then heel and
 ball, then ball), which must stay on the ground where it is (each over 2 cm), and clear it by 1 cm in the swing; angles
 beyond the smallest and the largest key point (each over 2 deg); the size of the higher harmonics and the acceleration
-of the sway (each over 2 m/s2), so that they do no more than needed. The unknowns are the series of hip, knee and ankle, the mean height of the pelvis and its
-sway forwards. The posture is that of the product's own equations.
+of the sway (each over 2 m/s2), so that they do no more than needed. The unknowns are the series of hip, knee and ankle,
+the mean height of the pelvis and its sway forwards. The posture is that of the product's own equations.
 """
 
 from __future__ import annotations

@@ -18,7 +18,7 @@ mirrors alpha),
     trunk    q_trunk = Rz(yaw) Ry(pitch) Rx(roll) of its own angles, from r_P          (5)
 
 Proportions in parts of H are those of Drillis and Contini as printed in [1], figure 4.1; where the hips lie in the
-pelvis, and the ankle and the ball on the foot, is chosen.
+pelvis, and heel and ball under the ankle, is chosen. Toes, which bend as the heel rises, are left out.
 
 [1] Winter, Biomechanics and Motor Control of Human Movement, Wiley, 4th edition 2009
 """
@@ -41,7 +41,6 @@ SEGMENTS = ("pelvis", "thigh", "shank", "foot", "trunk")
 THIGH_LENGTH = 0.245
 SHANK_LENGTH = 0.246
 ANKLE_HEIGHT = 0.039
-FOOT_LENGTH = 0.152
 TRUNK_LENGTH = 0.288  # hips to shoulders
 HEAD_LENGTH = 0.182
 HIP_HEIGHT = THIGH_LENGTH + SHANK_LENGTH + ANKLE_HEIGHT
@@ -49,7 +48,6 @@ HIP_HEIGHT = THIGH_LENGTH + SHANK_LENGTH + ANKLE_HEIGHT
 HALF_PELVIS = 0.05
 HEEL = (-0.038, 0.0, -ANKLE_HEIGHT)  # from the ankle
 BALL = (0.08, 0.0, -ANKLE_HEIGHT)
-TOE = (HEEL[0] + FOOT_LENGTH, 0.0, -ANKLE_HEIGHT)
 
 # Middle of each segment, from its upper joint (the trunk and the pelvis: from the centre of the pelvis).
 MIDDLE = (
@@ -136,13 +134,16 @@ def segments(posture: Posture, height: Any) -> tuple[Placed, ...]:
 
 
 def skeleton(posture: Posture, height: Any) -> Any:
-    """Points (16, 3) in the path frame: head, down the right leg, back to the pelvis, down the left leg."""
+    """Points (16, 3) in the path frame: head, down the right leg, back to the hip, across, down the left leg.
+
+    A leg: hip, knee, ankle, heel, ball, ankle again.
+    """
     pelvis, *right, trunk = segments(posture, height)
     left = leg_segments(pelvis, posture.left, 1, height)
 
     def down(thigh: Placed, shank: Placed, foot: Placed) -> list[Any]:
-        heel, toe = (foot.point(height * ca.vertcat(*place)) for place in (HEEL, TOE))
-        return [thigh.joint, shank.joint, foot.joint, heel, toe, foot.joint]
+        heel, ball = (foot.point(height * ca.vertcat(*place)) for place in (HEEL, BALL))
+        return [thigh.joint, shank.joint, foot.joint, heel, ball, foot.joint]
 
     head = trunk.point(ca.vertcat(0, 0, (TRUNK_LENGTH + HEAD_LENGTH) * height))
     first, second = down(*right), down(*left)

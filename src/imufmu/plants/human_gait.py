@@ -54,6 +54,7 @@ class Gait:
     """Curves of one gait. Lengths in parts of the height of the person."""
 
     key_points: dict[str, tuple[tuple[float, float], ...]]  # by joint: percent of the cycle, deg
+    flies: bool  # runs: the height of the pelvis is (5)
     stance: float  # part of the cycle that a foot is on the ground
     stride: float  # of the published curve
     hip: Series
@@ -71,6 +72,7 @@ WALKING = Gait(
         "knee": ((0, 5), (12, 20), (31, 5), (50, 5), (62, 40), (73, 62), (87, 25), (97, 5)),
         "ankle": ((0, 0), (8, -7), (31, 5), (48, 10), (62, -15), (75, -5), (87, 0)),
     },
+    flies=False,
     stance=0.62,
     stride=1.455 / 1.75,
     hip=(16.67, 21.72, -3.33, -3.46, -1.69, 0.25, 2.42, -0.97, -0.34, -0.08, -0.16),
@@ -87,14 +89,15 @@ RUNNING = Gait(
         "knee": ((0, 25), (16, 40), (38, 20), (68, 90)),
         "ankle": ((0, 5), (19, 30), (40, -20), (70, 0)),
     },
+    flies=True,
     stance=0.36,
     stride=2.357 / 1.75,
-    hip=(28.64, 22.00, -21.32, -2.18, 6.58, 0.65, 0.86, 0.31, 1.77, -0.47, -0.62),
-    knee=(44.90, -11.30, -23.18, -7.81, 18.78, 0.21, 3.16, -0.20, 1.69, -0.60, -0.04),
-    ankle=(-0.68, 8.44, 6.16, -4.73, 13.51, -2.13, -2.76, 1.44, -2.04, 1.67, -1.87),
+    hip=(25.38, 21.96, -21.39, -2.16, 3.07, -1.38, 2.07, 1.14, 0.52, -0.85, -1.41),
+    knee=(47.19, -8.31, -25.98, -8.92, 14.47, -2.29, 0.99, -1.24, 0.22, -1.49, -0.56),
+    ankle=(2.73, 16.11, 3.96, -7.36, 6.05, -6.37, -2.69, 0.42, -2.69, -0.56, 1.67),
     pelvis=(15.0, 0.0, 0.0, 2.0, 0.0),
-    drop=0.0253,
-    sway=(0.0000, -0.0003),
+    drop=0.0227,
+    sway=(0.0002, 0.0007),
     lean=8.0,
 )
 
@@ -130,7 +133,7 @@ def bounce(phase: Any) -> Any:
 def pelvis_offset(gait: Gait, phase: Any, p: SimpleNamespace) -> Any:
     """Pelvis (3,), m, about the point that moves on at constant speed at the height of the ground."""
     x = gait.sway[0] * ca.cos(4 * pi * phase) + gait.sway[1] * ca.sin(4 * pi * phase)
-    if gait is RUNNING:
+    if gait.flies:
         y, z = 0, bounce(phase) * p.g * (60 / p.cadence) ** 2
     else:
         y = -WALKING_SWAY / 2 * ca.cos(2 * pi * (phase - 0.3)) * p.height
