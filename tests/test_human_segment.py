@@ -38,7 +38,7 @@ def test_truth_is_one_motion_for_every_activity_and_segment(activity: dict[str, 
 def test_impacts_and_soft_tissue_belong_to_the_motion(segment: int) -> None:
     shaken = {"segment": segment, "impact_acceleration": 100.0, "wobble": 1, "rest": 0.2, "ramp": 0.4, "max_step": 5e-4}
     run = moved(1.5, 0.001, RUN, shaken)
-    # A jump of the fourth derivative of a burst of 60 ms at both its ends, in rows of 1 ms.
+    # A jump of the fourth derivative of a burst of 80 ms at both its ends, in rows of 1 ms.
     assert_truth_consistent(run, GRAVITY, np.array(MID_EUROPE), tolerance=1e-5)
 
 

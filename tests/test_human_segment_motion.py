@@ -35,10 +35,10 @@ def test_curves_meet_their_published_key_points(gait: Gait) -> None:
 @pytest.mark.parametrize(
     ("activity", "bands"),
     [
-        # Normal ranges: hip 40 to 48, knee 57 to 67, ankle 25 to 35 deg: key points of [1] in human_gait, with 5 deg.
-        (WALK, [(40, 50), (52, 62), (20, 30)]),
-        # Pink et al. 1994, Am. J. Sports Med. 22(4): hip 40 at a slow pace and more at a faster one; Grimshaw: 64, 65
-        # to 90, 50 deg. Knee 95 from extension.
+        # The key points of [1] in human_gait span 45, 57 (to 65) and 25 deg; 5 deg to either side.
+        (WALK, [(40, 50), (52, 65), (20, 30)]),
+        # Arcs of slow runners in Pink et al. 1994, Am. J. Sports Med. 22(4): hip 40 and more at a faster pace, knee 95,
+        # ankle 50; the key points of [2] in human_gait span 64, 65 at least, and 50.
         (RUN, [(40, 69), (65, 95), (45, 55)]),
     ],
     ids=["walking", "running"],
@@ -133,9 +133,9 @@ def test_an_impact_is_a_short_burst_of_the_stated_peak_after_the_contact() -> No
     clean, run = (moved(8.0, 0.001, WALK, segment=body.FOOT, impact_acceleration=a) for a in (0.0, 60.0))
     added = run["specific_force"] - clean["specific_force"]
     up = np.einsum("ij,ij->i", added, run["vertical"])[steady(run)]
-    assert up.max() == pytest.approx(60.0, rel=0.01)  # rows of 1 ms in a burst of 60 ms
+    assert up.max() == pytest.approx(60.0, rel=0.01)  # rows of 1 ms in a burst of 80 ms
     assert length(added)[steady(run)] == pytest.approx(np.abs(up), abs=1e-12)
-    share = 0.06 * 113 / 120  # of a stride
+    share = 0.08 * 113 / 120  # of a stride
     assert np.mean(np.abs(up) > 1e-9) == pytest.approx(share, abs=0.01)
     assert not added[run.time < 1.0].any()
 

@@ -12,24 +12,26 @@
     posture = standing + e (gait - standing)                                           (3)
     x = v int e dt + e sway(phi)                                                       (4)
 
-Key points of walking [1] (percent of the cycle, deg; hip: thigh to the vertical plus 10 deg of pelvic tilt) and of
-running [2] are WALKING.key_points and RUNNING.key_points below. The coefficients are ours: least squares over the key
-points together with a stance foot that stays where it is on the ground, by models/human_segment/fit_gait.py, which
-prints the tables. Walking stands for 1.37 m/s and 113 steps/min, a usual pace; running for 3.3 m/s and 168 steps/min.
+Key points. Walking: the angles at the ends of the phases of the gait cycle [1] (hip: the thigh's to the vertical, plus
+10 deg of pelvic tilt; the largest bend of the knee, 60 to 70, read as 62 at 73 % of the cycle). Running: hip, knee and
+ankle at foot strike, mid stance and toe-off and their largest [2]; when they occur in the cycle, the ankle at foot
+strike and in the swing, the knee at toe-off and the hip at 90 % are ours. WALKING.key_points and RUNNING.key_points
+hold them, in percent of the cycle and deg. The coefficients are ours too: least squares over the key points together
+with a stance foot that stays where it is on the ground, by models/human_segment/fit_gait.py, which prints the tables
+and what is left over. Walking is fitted at 1.37 m/s and 113 steps/min, a usual pace, running at 3.3 m/s and 168.
 
 The pelvis. Walking: it rises and falls twice per stride, by 46 mm in all [3], highest in the middle of each single
 stance (30 and 80 % of the cycle), and sways once by 40 mm towards the foot that carries. Running: the ground pushes
-with a half sine for the part BETA of each step (Alexander's model), the rest is free flight; the height is the
-second integral, (5), to three harmonics:
+with a half sine for the part BETA of each step and the rest is free flight; the height is the second integral of
 
     z'' = g (pi / (2 BETA) sin(pi psi / BETA) - 1) in contact, -g in flight, psi = 2 phi mod 1      (5)
 
-Both: 4 deg of list, 5 deg of rotation to each side, small counter-rotation of the trunk (chosen; the usual size).
+to three harmonics, so its size follows from the cadence. Both: 4 deg of list, 5 deg of rotation to each side and a
+small counter-rotation of the trunk, all chosen.
 
-[1] Ottobock, The eight phases of human gait cycle, poster 400W43 (after Perry; ends of the phases)
-[2] Grimshaw, Lees, Fowler, Burden, Sport and Exercise Biomechanics, 2006, doi:10.4324/9780203488300-34: hip, knee and
-    ankle of running at foot strike, mid stance, toe-off and their largest; times within the cycle are ours
-[3] Perry 1992 as cited by Whittle, Human Movement Science 16, 1997, doi:10.1016/S0167-9457(96)00052-8
+[1] Ottobock, The eight phases of human gait cycle, poster 400W43
+[2] Abstract of the chapter doi:10.4324/9780203488300-34 (Taylor and Francis)
+[3] Perry 1992, cited by Whittle, Human Movement Science 16, 1997, doi:10.1016/S0167-9457(96)00052-8
 """
 
 from __future__ import annotations

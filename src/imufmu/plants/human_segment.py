@@ -127,6 +127,12 @@ def mounting(t: Any, p: SimpleNamespace) -> Any:
     return ca.vertcat(r_N, multiply(multiply(heading(p), q_PB), q_BS))
 
 
+def motion(t: Any, p: SimpleNamespace) -> tuple[Any, Any, Any]:
+    """r and q_NS with their first two time derivatives, each (7,); terms that occur twice are computed once."""
+    stacked = ca.cse(ca.vertcat(*along(partial(mounting, p=p), t, 1)))
+    return stacked[:7], stacked[7:14], stacked[14:]
+
+
 def initial(p: SimpleNamespace) -> Expressions:
     """The case at its rest position."""
     return dict(offset=ca.SX.zeros(3), offset_rate=ca.SX.zeros(3))
@@ -140,13 +146,13 @@ def wobble(x: SimpleNamespace, p: SimpleNamespace) -> Any:
 
 def dynamics(x: SimpleNamespace, u: SimpleNamespace, p: SimpleNamespace, t: Any) -> Expressions:
     """State derivative; nothing moves on a rigid mount. (4)"""
-    acceleration = along(partial(mounting, p=p), t, 1)[2][:3]
+    acceleration = motion(t, p)[2][:3]
     return dict(offset=x.offset_rate, offset_rate=ca.if_else(p.wobble, wobble(x, p) - acceleration, 0))
 
 
 def output(x: SimpleNamespace, u: SimpleNamespace, p: SimpleNamespace, t: Any) -> Expressions:
     """Truth at the sensor, skeleton and joint angles."""
-    value, rate, acceleration = along(partial(mounting, p=p), t, 1)
+    value, rate, acceleration = motion(t, p)
     q_NS = value[3:]
     w_S = 2 * multiply(conjugate(q_NS), rate[3:])[1:]  # (2)
     body = posture(t, p)
@@ -176,11 +182,10 @@ imu_position from the middle of its segment (the centre of the pelvis, the inste
 angles mount from the frame of the segment, which is x forwards, y left, z up where the person stands upright. With
 impact_acceleration a short burst of acceleration follows each contact of a foot; it is 0 at first, because bursts are
 too short for a record at 100 Hz. With wobble the sensor hangs on soft tissue, a spring and a damper. The pelvis is
-driven, not the foot: the stance foot slides and lifts by up to 3 cm at the published pace, more at others. Times
-count from 0 whatever the start time is. Arms, and the deformation of the segments, are left out.""",
+driven, not the foot: the foot that carries slides and lifts by up to 2 cm at the pace of the curves, more at others.
+Times count from 0 whatever the start time is. Arms, toes, and the deformation of the segments are left out.""",
     reference="D. A. Winter, Biomechanics and Motor Control of Human Movement, Wiley 2009 (proportions); Ottobock, The "
-    "eight phases of human gait cycle (walking); P. Grimshaw, A. Lees, N. Fowler, A. Burden, Sport and Exercise "
-    "Biomechanics, 2006, doi:10.4324/9780203488300 (running)",
+    "eight phases of human gait cycle, poster 400W43 (walking); chapter doi:10.4324/9780203488300-34 (running)",
     inputs=(),
     outputs=OUTPUTS,
     locals=(
@@ -206,7 +211,7 @@ count from 0 whatever the start time is. Arms, and the deformation of the segmen
         real("speed", "m/s", 1.37, (0, 10), "Activities 0, 1, 3: speed over the ground"),
         real("cadence", "1/min", 113.0, (40, 240), "Activities 0, 1: steps per minute of both feet"),
         real("impact_acceleration", "m/s2", 0.0, (0, 1e3), "Activities 0, 1: peak of the burst at the foot; 0 none"),
-        real("impact_duration", "s", 0.06, (0.005, 0.25), "Activities 0, 1: length of the burst"),
+        real("impact_duration", "s", 0.08, (0.005, 0.25), "Activities 0, 1: length of the burst"),
         real("jump_acceleration", "m/s2", 40.0, (10, 200), "Activity 2: largest upward acceleration of the pelvis"),
         real("jump_height", "m", 0.35, (0.02, 1), "Activity 2: rise of the pelvis in flight"),
         real("stroke_time", "s", 1.2, (0.3, 10), "Activity 3: time of one stroke"),
