@@ -13,6 +13,7 @@ from human import ANKLE, BALL, HEAD, HEEL, HEIGHT, JUMP, LEFT, PELVIS, RISE, RUN
 from imufmu.plants import human_body as body
 from imufmu.plants.human_activities import SQUARE_WAVE, TIPTOE
 from imufmu.plants.human_gait import RUNNING, WALKING, Gait, series
+from imufmu.plants.human_segment import IMPACT_SHARE
 from imufmu.vocabulary import GRAVITY
 
 GAITS = pytest.mark.parametrize("gait", [WALKING, RUNNING], ids=["walking", "running"])
@@ -138,6 +139,26 @@ def test_an_impact_is_a_short_burst_of_the_stated_peak_after_the_contact() -> No
     share = 0.08 * 113 / 120  # of a stride
     assert np.mean(np.abs(up) > 1e-9) == pytest.approx(share, abs=0.01)
     assert not added[run.time < 1.0].any()
+
+
+@pytest.mark.parametrize("segment", range(5), ids=body.SEGMENTS)
+def test_pelvis_and_trunk_feel_both_feet_and_a_leg_its_own(segment: int) -> None:
+    given = {"segment": segment, "ramp": 1.0}
+    clean, run = (moved(7.0, 0.002, WALK, given, impact_acceleration=a) for a in (0.0, 50.0))
+    up = np.einsum("ij,ij->i", run["specific_force"] - clean["specific_force"], run["vertical"])[run.time > 2.0]
+    share = IMPACT_SHARE[segment]
+    assert up.max() == pytest.approx(50.0 * share, rel=0.01)  # rows of 2 ms in a burst of 80 ms
+    bursts = np.count_nonzero(np.diff((up > 25.0 * share).astype(int)) == 1)
+    contacts = 5.0 * 113 / 60 / (1 if segment in (body.PELVIS, body.TRUNK) else 2)
+    assert abs(bursts - contacts) < 1
+
+
+@pytest.mark.parametrize(
+    ("activity", "lean"), [(WALK, 2.0), (RUN, 8.0), (SKATE, 35.0)], ids=["walking", "running", "skating"]
+)
+def test_the_trunk_leans_forwards_in_motion(activity: dict[str, Any], lean: float) -> None:
+    run = moved(8.0, 0.05, activity, segment=body.TRUNK)
+    assert np.degrees(run["pitch"][steady(run)]) == pytest.approx(lean, abs=1e-9)
 
 
 @pytest.mark.parametrize(
