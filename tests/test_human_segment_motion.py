@@ -139,6 +139,9 @@ def test_an_impact_is_a_short_burst_of_the_stated_peak_after_the_contact() -> No
     share = 0.08 * 113 / 120  # of a stride
     assert np.mean(np.abs(up) > 1e-9) == pytest.approx(share, abs=0.01)
     assert not added[run.time < 1.0].any()
+    one = up[np.argmax(up) - 45 : np.argmax(up) + 45]
+    spectrum = np.abs(np.fft.rfft(one, 4096))
+    assert 12 < np.argmax(spectrum) / (4096 * 0.001) < 20  # Hz: Shorten and Winslow 1992, shanks of runners
 
 
 @pytest.mark.parametrize("segment", range(5), ids=body.SEGMENTS)
@@ -192,9 +195,10 @@ def test_the_printed_fit_is_the_one_in_the_module() -> None:
         assert (gait.drop, *gait.sway) == pytest.approx((fitted.drop, *fitted.sway), abs=2e-4)
 
 
+@pytest.mark.parametrize("ramp", [2.0, 50.0])
 @pytest.mark.parametrize("activity", [WALK, RUN, SKATE], ids=["walking", "running", "rollerblading"])
-def test_motion_starts_and_ends_at_rest(activity: dict[str, Any]) -> None:
-    run = moved(8.0, 0.01, activity, rest=1.0, duration=5.0, segment=body.SHANK)
+def test_motion_starts_and_ends_at_rest(activity: dict[str, Any], ramp: float) -> None:
+    run = moved(8.0, 0.01, activity, rest=1.0, duration=5.0, ramp=ramp, segment=body.SHANK)
     still = (run.time < 1.0) | (run.time > 6.0)
     for name in ("velocity", "angular_velocity", "external_acceleration"):
         assert not np.abs(run[name][still]).any(), name

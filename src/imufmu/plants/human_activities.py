@@ -51,6 +51,8 @@ import casadi as ca
 from .human_body import ANKLE_HEIGHT, BALL, PELVIC_TILT, SHANK_LENGTH, THIGH_LENGTH, Leg, Posture
 from .time_functions import smooth_step, step_double_integral, step_integral
 
+LEAST_GRAVITY = 0.1  # m/s2: with less, jump and lean move as with this; without any, a jump would never end
+
 # Jump; lengths in parts of the height.
 DIP_TIME = 0.4  # s
 RELEASE_TIME = 0.03  # s
@@ -70,12 +72,17 @@ def bent_leg(length: Any, rise: Any, pelvis_pitch: Any, height: Any) -> Leg:
     return Leg(thigh + pelvis_pitch, knee, knee - thigh - foot)
 
 
+def gravity(p: SimpleNamespace) -> Any:
+    """g (m/s2) that decides how the body moves."""
+    return ca.fmax(p.g, LEAST_GRAVITY)
+
+
 def jump_times(p: SimpleNamespace) -> tuple[Any, Any, Any, Any]:
     """Take-off speed v (m/s), push T (s), highest point t_a (s), dip d (m). (2)"""
-    v = ca.sqrt(2 * p.g * p.jump_height)
+    v = ca.sqrt(2 * gravity(p) * p.jump_height)
     push = 35 / 16 * v / p.jump_acceleration
     dip = ca.fmin(v * push / 2 - ca.fmin(HEEL_RISE * p.height, v * push / 4), DEEPEST_DIP * p.height)
-    return v, push, DIP_TIME + push + RELEASE_TIME / 2 + v / p.g, dip
+    return v, push, DIP_TIME + push + RELEASE_TIME / 2 + v / gravity(p), dip
 
 
 def jump(t: Any, p: SimpleNamespace) -> Posture:
@@ -83,7 +90,7 @@ def jump(t: Any, p: SimpleNamespace) -> Posture:
     v, push, highest, dip = jump_times(p)
     since = highest - ca.fabs(t - highest)
     z = -dip * smooth_step(since / DIP_TIME) + v * push * step_integral((since - DIP_TIME) / push)
-    z -= p.g * RELEASE_TIME**2 * step_double_integral((since - DIP_TIME - push) / RELEASE_TIME)
+    z -= gravity(p) * RELEASE_TIME**2 * step_double_integral((since - DIP_TIME - push) / RELEASE_TIME)
     eps = SOFTNESS * p.height
     bend = (z - ca.sqrt(z**2 + eps**2) + eps) / 2
     lean = -2 * bend / p.height  # rad: 20 deg for a dip of 30 cm
@@ -114,7 +121,7 @@ def skating(t: Any, p: SimpleNamespace) -> Posture:
     for k, c in SQUARE_WAVE.items():
         s += c * ca.sin(k * omega * t)
         double_integral -= c * ca.sin(k * omega * t) / (k * omega) ** 2
-    roll = -ca.atan(p.lateral_acceleration * s / p.g)
+    roll = -ca.atan(p.lateral_acceleration * s / gravity(p))
     z = (SKATING_HEIGHT - SKATING_DIP * ca.sin(omega * t) ** 2) * p.height
     return Posture(
         position=ca.vertcat(0, p.lateral_acceleration * double_integral, z),

@@ -158,10 +158,11 @@ def gait_posture(gait: Gait, phase: Any, p: SimpleNamespace) -> Posture:
 
 
 def envelope(t: Any, p: SimpleNamespace) -> tuple[Any, Any]:
-    """e(t), and its integral (s): rest, ramp, motion, ramp, rest."""
-    up = (t - p.rest) / p.ramp
-    down = (t - p.rest - p.duration + p.ramp) / p.ramp
-    return smooth_step(up) - smooth_step(down), p.ramp * (step_integral(up) - step_integral(down))
+    """e(t), and its integral (s): rest, ramp, motion, ramp, rest; a ramp is at most half of the motion."""
+    ramp = ca.fmin(p.ramp, p.duration / 2)
+    up = (t - p.rest) / ramp
+    down = (t - p.rest - p.duration + ramp) / ramp
+    return smooth_step(up) - smooth_step(down), ramp * (step_integral(up) - step_integral(down))
 
 
 def stride_phase(t: Any, p: SimpleNamespace) -> Any:

@@ -207,7 +207,7 @@ Times count from 0 whatever the start time is. Arms, toes, and the deformation o
         real("height", "m", 1.75, (1.3, 2.2), "Height of the person"),
         real("rest", "s", 1.0, (0, 1e6), "Rest before the motion"),
         real("duration", "s", 20.0, (0.1, 1e6), "Activities 0, 1, 3: motion from rest to rest, with its ramps"),
-        real("ramp", "s", 2.0, (0.1, 1e6), "Activities 0, 1, 3: time in which the motion grows, and fades"),
+        real("ramp", "s", 2.0, (0.1, 1e6), "Activities 0, 1, 3: time to grow, and to fade; at most half of duration"),
         real("speed", "m/s", 1.37, (0, 10), "Activities 0, 1, 3: speed over the ground"),
         real("cadence", "1/min", 113.0, (40, 240), "Activities 0, 1: steps per minute of both feet"),
         real("impact_acceleration", "m/s2", 0.0, (0, 1e3), "Activities 0, 1: peak of the burst at the foot; 0 none"),
