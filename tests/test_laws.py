@@ -331,6 +331,24 @@ def test_the_truth_of_a_plant_does_not_depend_on_later_inputs(block: Block, back
 
 
 @over(PLANTS)
+def test_any_communication_step_gives_the_same_truth(block: ContinuousBlock) -> None:
+    """Inputs held away from their start; communication steps of 0.1 ms to 0.1 s; truth at 0.1 s and at 0.2 s."""
+    held = {}
+    for s in block.inputs:
+        away = np.array(s.start_values()).reshape(s.shape) + 0.3 * s.nominal
+        held[s.name] = np.clip(away, s.minimum, s.maximum)
+    at_both: dict[str, list[np.ndarray]] = {s.name: [] for s in (*v.TRUTH, *v.IDEAL_IMU)}
+    for step in (1e-4, 1e-3, 0.01, 0.1):
+        run = simulate(block, 0.2, step, held)
+        for name, values in at_both.items():
+            values.append(run[name][[round(0.1 / step), round(0.2 / step)]])
+    for name, values in at_both.items():
+        # RK4 takes steps of 0.1 ms in the first run, of max_step (1 to 2 ms) in the last: an error of order
+        # (rate * step)^4 in 0.2 s, for rates of tens per second.
+        assert np.ptp(values, axis=0).max() <= 1e-8 * max(1.0, np.abs(values).max()), name
+
+
+@over(PLANTS)
 def test_a_magnetic_disturbance_is_added_in_its_intervals(block: ContinuousBlock) -> None:
     field = np.array([5.0, -3.0, 2.0])
     times = {"disturbance_start": (0.5, 2.0, 0.0), "disturbance_stop": (1.5, 3.0, 9.0)}

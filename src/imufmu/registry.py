@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from .block import Block
 from .estimators import bennett2014, lee2012, leechoi2018, plumb, rizun2008, zihajehzadeh2014
-from .plants import handheld, human_segment, pendulum
+from .plants import handheld, human_segment, pendulum, vehicle
 from .sensors import imu
 
 ESTIMATORS: tuple[Block, ...] = (
@@ -15,7 +15,13 @@ ESTIMATORS: tuple[Block, ...] = (
     bennett2014.BLOCK,
     plumb.BLOCK,
 )
-PLANTS: tuple[Block, ...] = (pendulum.PENDULUM, pendulum.DOUBLE_PENDULUM, handheld.BLOCK, human_segment.BLOCK)
+PLANTS: tuple[Block, ...] = (
+    pendulum.PENDULUM,
+    pendulum.DOUBLE_PENDULUM,
+    handheld.BLOCK,
+    human_segment.BLOCK,
+    vehicle.BLOCK,
+)
 SENSORS: tuple[Block, ...] = (imu.BLOCK,)
 
 BLOCKS: dict[str, Block] = {block.name: block for block in (*ESTIMATORS, *PLANTS, *SENSORS)}
