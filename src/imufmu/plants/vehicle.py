@@ -18,7 +18,7 @@ Inputs reach the car through its controls, so that the truth stays smooth when a
 
 The start is the steady state of driving straight, or of standing on the slope. The tyres then carry the resistance:
 
-    Fx = share F_drive - z (F_brake + f_r Fz),   rho = C tan(asin(Fx / mu Fz) / C)                (4)
+    F = share F_drive - z (F_brake + f_r Fz),   w = F / mu Fz,   slip(w) for the spin             (4)
 """
 
 from __future__ import annotations
@@ -52,8 +52,7 @@ STATE = (
     State("body_angle", (2,)),
     State("body_rate", (2,)),
     State("spin", (2,)),
-    State("slip", (2,)),
-    State("lateral_slip", (2,)),
+    State("grip", (2, 2)),
     State("brake_wrap", (2,)),
     State("steering", (2,)),
     State("drive_force"),
@@ -68,7 +67,7 @@ STATE = (
 
 def initial(p: SimpleNamespace) -> Expressions:
     """Driving straight at initial_speed, or standing on the slope. (4)"""
-    x = SimpleNamespace(**{state.name: ca.SX.zeros(state.size) for state in STATE})
+    x = SimpleNamespace(**{state.name: ca.SX.zeros(*state.shape) for state in STATE})
     x.heading = x.reference_heading = p.heading
     x.velocity[0] = p.initial_speed
     x.grade[0], x.bank[0] = p.road_grade, p.road_bank
@@ -88,13 +87,12 @@ def initial(p: SimpleNamespace) -> Expressions:
     swing = p.body_mass * p.body_com_height
     x.body_angle[PITCH] = -swing * along / p.mass / (p.pitch_stiffness - swing * p.g * up[2])
     load = axle_loads(x, p)
-    slips, spins = [], []
     for i, (drive, largest) in enumerate(wheel_shares(x, p, load)):
-        used = (drive - z * largest) / (p.friction * load[i])
-        slip = slip_for(ca.fmax(ca.fmin(used, NEARLY_ALL), -NEARLY_ALL), p.tyre_shape) / p.longitudinal_stiffness
-        slips.append(slip)
-        spins.append(p.initial_speed * (1 + slip / 2) / (1 - slip / 2) / p.wheel_radius)
-    x.slip, x.spin = ca.vertcat(*slips), ca.vertcat(*spins)
+        grip = (drive - z * largest) / (p.friction * load[i])
+        grip = ca.fmax(ca.fmin(grip, NEARLY_ALL), -NEARLY_ALL)
+        slip = slip_for(grip, p)
+        x.grip[i, 0] = grip
+        x.spin[i] = p.initial_speed * (1 + slip / 2) / (1 - slip / 2) / p.wheel_radius
     return vars(x)
 
 

@@ -36,7 +36,7 @@ from typing import Any
 import casadi as ca
 
 from .vehicle_road import PITCH, ROLL, up_in_road
-from .vehicle_tyre import axle_friction, force_over_friction, slip_rates, spin_rate, wrap_rate
+from .vehicle_tyre import axle_friction, grip_rate, spin_rate, wrap_rate
 
 FRONT, REAR = 0, 1
 
@@ -66,34 +66,30 @@ def axle_loads(x: SimpleNamespace, p: SimpleNamespace) -> tuple[Any, Any]:
     return front, weight - front
 
 
-def contact_velocities(x: SimpleNamespace, p: SimpleNamespace) -> tuple[tuple[Any, Any], tuple[Any, Any]]:
-    """Velocity (m/s) of the front and the rear contact point, along and across the wheel."""
+def contact_velocities(x: SimpleNamespace, p: SimpleNamespace) -> tuple[Any, Any]:
+    """Velocity (2,), m/s, of the front and of the rear contact point, along and across the wheel."""
     delta = steering_angle(x, p)
     v_x, v_y = x.velocity[0], x.velocity[1]
     front_y, rear_y = v_y + p.front_distance * x.yaw_rate, v_y - p.rear_distance * x.yaw_rate
-    front = ca.cos(delta) * v_x + ca.sin(delta) * front_y, ca.cos(delta) * front_y - ca.sin(delta) * v_x
-    return front, (v_x, rear_y)
+    along, across = ca.cos(delta) * v_x + ca.sin(delta) * front_y, ca.cos(delta) * front_y - ca.sin(delta) * v_x
+    return ca.vertcat(along, across), ca.vertcat(v_x, rear_y)
 
 
 def axles(x: SimpleNamespace, p: SimpleNamespace) -> SimpleNamespace:
-    """Pairs (front, rear): load, friction, force along and across the wheel (N), rates of the slips."""
-    found = SimpleNamespace(load=axle_loads(x, p), friction=[], along=[], across=[], slip_rate=[], lateral_rate=[])
+    """Pairs (front, rear): load (N), friction (1), force (N) along and across the wheel, rate of the grip (1/s)."""
+    found = SimpleNamespace(load=axle_loads(x, p), friction=[], along=[], across=[], grip_rate=[])
     roll_moment, _ = spring_moments(x, p)
     parts = p.front_roll_share, 1 - p.front_roll_share
-    stiffness = ca.vertsplit(p.cornering_stiffness)
-    for i, (V_x, V_y) in enumerate(contact_velocities(x, p)):
-        slip_rate, lateral_rate, T = slip_rates(V_x, V_y, x.spin[i], x.slip[i], x.lateral_slip[i], p)
-        rho_x = p.longitudinal_stiffness * (x.slip[i] + T * slip_rate)
-        rho_y = stiffness[i] * (x.lateral_slip[i] + T * lateral_rate)
-        along, across = force_over_friction(rho_x, rho_y, p.tyre_shape)
+    for i, velocity in enumerate(contact_velocities(x, p)):
+        stiffness = ca.vertcat(p.longitudinal_stiffness, p.cornering_stiffness[i])
+        rate, grip = grip_rate(velocity, p.wheel_radius * x.spin[i], x.grip[i, :].T, stiffness, p)
         load = found.load[i]
-        moved = (parts[i] * roll_moment + p.roll_axis_height * p.friction * load * across) / p.track  # (6)
+        moved = (parts[i] * roll_moment + p.roll_axis_height * p.friction * load * grip[1]) / p.track  # (6)
         friction = axle_friction(load, moved, p)
         found.friction.append(friction)
-        found.along.append(friction * load * along)
-        found.across.append(friction * load * across)
-        found.slip_rate.append(slip_rate)
-        found.lateral_rate.append(lateral_rate)
+        found.along.append(friction * load * grip[0])
+        found.across.append(friction * load * grip[1])
+        found.grip_rate.append(rate.T)
     return found
 
 
@@ -103,7 +99,7 @@ def air_drag(x: SimpleNamespace, p: SimpleNamespace) -> Any:
 
 
 def motion(x: SimpleNamespace, p: SimpleNamespace) -> dict[str, Any]:
-    """Time derivative of the states velocity, yaw_rate, body_rate, spin, slip, lateral_slip, brake_wrap."""
+    """Time derivative of the states velocity, yaw_rate, body_rate, spin, grip, brake_wrap."""
     wheel = axles(x, p)
     delta, up = steering_angle(x, p), up_in_road(x)
     front_x = ca.cos(delta) * wheel.along[FRONT] - ca.sin(delta) * wheel.across[FRONT]
@@ -134,9 +130,8 @@ def motion(x: SimpleNamespace, p: SimpleNamespace) -> dict[str, Any]:
                 for i, (drive, friction) in enumerate(shares)
             )
         ),
-        slip=ca.vertcat(*wheel.slip_rate),
-        lateral_slip=ca.vertcat(*wheel.lateral_rate),
-        brake_wrap=ca.vertcat(*(wrap_rate(x.spin[i], x.brake_wrap[i], p) for i in (FRONT, REAR))),
+        grip=ca.vertcat(*wheel.grip_rate),
+        brake_wrap=ca.vertcat(*(wrap_rate(p.wheel_radius * x.spin[i], x.brake_wrap[i]) for i in (FRONT, REAR))),
     )
 
 

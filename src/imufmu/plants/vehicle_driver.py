@@ -84,9 +84,9 @@ def lane_change(x: Any, p: SimpleNamespace) -> Any:
 
 def slalom(x: Any, p: SimpleNamespace) -> Any:
     """Course y (m) of the slalom at x (m): farthest from the line of cones at each of them, on alternate sides."""
-    since = (x - p.path_start) / p.cone_distance
-    grown = smooth_step(since + 1) * smooth_step(p.cones - since)
-    return p.slalom_amplitude * grown * ca.cos(pi * since)
+    cone = (x - p.path_start) / p.cone_distance  # 1 at the first
+    grown = smooth_step(cone) * smooth_step(p.cones + 1 - cone)
+    return -p.slalom_amplitude * grown * ca.cos(pi * cone)
 
 
 def course_curvature(course: Any, x: Any) -> Any:

@@ -1,29 +1,29 @@
 """Tyres, wheels and brakes of the vehicle: what one axle does on the road.
 
     symbol      here                unit    meaning, for one axle
-    Vx, Vy      V_x, V_y            m/s     velocity of the contact point, along and across the wheel
+    v_s         sliding             m/s     rim minus road, along the wheel; across it, minus the contact point's velocity
     omega       spin                rad/s   of the wheels
-    kappa, tau  slip, lateral_slip  1       state of the tyre: what is left of the sliding after the contact length
+    V           transport           m/s     at which the contact patch is renewed
+    w           grip                1       state: force over mu Fz, along and across the wheel
+    c           stiffness           1       (longitudinal, cornering): initial slope of w over slip; per rad across
     sigma       p.relaxation_length m       way in which a tyre builds up its force
-    rho         rho                 1       slip times stiffness, along and across
-    c_x, c_y    p.longitudinal_stiffness, p.cornering_stiffness (1, 1/rad)    initial slope of force over mu Fz
     C           p.tyre_shape        1       of the magic formula
     mu, Fz      friction, load      1, N    of the axle
-    z           brake_wrap          1       how far the brake's lining has taken its force: -1 to 1
+    z           brake_wrap          1       part of the brake's friction that acts, -1 to 1
 
-Slip as a state [1, chapter 7]. Nothing is divided by a speed, so standing still is a motion like any other:
+The force is a state [1, chapter 7] and nothing is divided by a speed that is zero at rest, so that standing, starting
+and stopping are motions like any other. With c v_s element by element,
 
-    sigma kappa' = R omega - Vx - V kappa                                                        (1)
-    sigma tau'   = -Vy - V tau,         V = (|(Vx, Vy)| + |R omega|) / 2                          (2)
+    w' = (c v_s - D w) / (sigma + D T_w)                                                          (1)
+    D = V / G(|rho|),   rho = c v_s / V,   G(rho) = sin(C atan(rho / C)) / rho                     (2)
+    V = (|(Vx, Vy)| + |R omega|) / 2                                                              (3)
 
-At speed kappa and tau settle to the slip of the books. At standstill they are the deflection of a spring, which the
-damper T(V) quiets:
+Rolling steadily, w = G(|rho|) rho: the magic formula [1, section 4.3] of the combined slip rho / c, built up over the
+way sigma. Standing, w' = c v_s / sigma: a spring. Sliding with locked wheels, D = c |v_s| / sin(...): dry friction, which
+forgets its deflection over sigma / c, the way that the tyre's rubber gives. T_w bounds the rate. |w| <= 1 is the friction
+circle; a damper that fades with V quiets the spring of a car at rest, inside the same circle:
 
-    s = (kappa, tau) + T(V) (kappa', tau'),   T(V) = T_0 / (1 + (V / V_0)^2)                      (3)
-
-Magic formula [1, section 4.3] of the combined slip; its length is at most 1, the friction circle holds by its form:
-
-    F = mu Fz sin(C atan(|rho| / C)) rho / |rho|,   rho = (c_x s_x, c_y s_y)                      (4)
+    F = mu Fz w_d / max(1, |w_d|),   w_d = w + w' T_0 / (1 + (V / V_0)^2)                         (4)
 
 The friction of the two wheels of an axle falls with their load: mu_w = mu_0 (1 - k (Fw / F0 - 1)), F0 = m g / 4. With
 the load dF moved from one wheel to the other, and mu Fz the sum over both,
@@ -34,7 +34,7 @@ Brakes and rolling resistance are dry friction [2] that builds up within the way
 it never drives a wheel further than about d, and it holds one without creep.
 
     z' = (R omega - |R omega| z) / (d + T_b |R omega|)                                            (6)
-    I omega' = R (Fx_drive - z (F_brake + f_r Fz) - Fx)                                           (7)
+    I omega' = R (F_drive - z (F_brake + f_r Fz) - F)                                             (7)
 
 [1] H. B. Pacejka, Tire and Vehicle Dynamics, 3rd edition, Butterworth-Heinemann 2012
 [2] P. R. Dahl, A Solid Friction Model, The Aerospace Corporation, TOR-0158(3107-18)-1, 1968
@@ -49,6 +49,7 @@ import casadi as ca
 
 from ..rotations import TINY, norm
 
+GRIP_TIME = 1e-3  # s: T_w
 DAMPING_TIME = 0.02  # s: T_0
 DAMPED_BELOW = 1.0  # m/s: V_0
 WRAP_LENGTH = 0.01  # m: d
@@ -56,25 +57,23 @@ WRAP_TIME = 0.01  # s: T_b
 LEAST_FRICTION = 0.1  # of mu_0, however large the load
 
 
-def slip_rates(V_x: Any, V_y: Any, spin: Any, slip: Any, lateral_slip: Any, p: SimpleNamespace) -> tuple[Any, Any, Any]:
-    """Rates of slip and lateral slip (1/s), and the damper's time T (s); of one axle. (1), (2), (3)"""
-    rim = p.wheel_radius * spin
-    V = (norm(ca.vertcat(V_x, V_y)) + ca.fabs(rim)) / 2
-    slip_rate = (rim - V_x - V * slip) / p.relaxation_length  # (1)
-    lateral_rate = (-V_y - V * lateral_slip) / p.relaxation_length  # (2)
-    return slip_rate, lateral_rate, DAMPING_TIME / (1 + (V / DAMPED_BELOW) ** 2)
+def grip_rate(velocity: Any, rim: Any, grip: Any, stiffness: Any, p: SimpleNamespace) -> tuple[Any, Any]:
+    """Rate w' (2,) of an axle, 1/s, and the grip w_d (2,) that its force has; both along and across the wheel.
+
+    velocity: (2,), of the contact point along and across the wheel, m/s. rim: R omega, m/s. (1) to (4)
+    """
+    V = (norm(velocity) + ca.fabs(rim)) / 2  # (3)
+    pull = stiffness * (ca.vertcat(rim, 0) - velocity)
+    rho = norm(pull) / (V + TINY)
+    D = (V + TINY) * rho / ca.sin(p.tyre_shape * ca.atan(rho / p.tyre_shape))  # (2)
+    rate = (pull - D * grip) / (p.relaxation_length + D * GRIP_TIME)  # (1)
+    damped = grip + rate * DAMPING_TIME / (1 + (V / DAMPED_BELOW) ** 2)
+    return rate, damped / ca.fmax(1, norm(damped))  # (4)
 
 
-def force_over_friction(rho_x: Any, rho_y: Any, shape: Any) -> tuple[Any, Any]:
-    """Force over mu Fz (1), along and across the wheel. (4)"""
-    rho = ca.sqrt(rho_x**2 + rho_y**2 + TINY**2)
-    gain = ca.sin(shape * ca.atan(rho / shape)) / rho
-    return gain * rho_x, gain * rho_y
-
-
-def slip_for(force: Any, shape: Any) -> Any:
-    """rho of a pure slip that gives this force over mu Fz, within (-1, 1): (4) backwards."""
-    return shape * ca.tan(ca.asin(force) / shape)
+def slip_for(grip: Any, p: SimpleNamespace) -> Any:
+    """Longitudinal slip (1) of a tyre that rolls steadily with this grip, within (-1, 1): (2) backwards."""
+    return p.tyre_shape * ca.tan(ca.asin(grip) / p.tyre_shape) / p.longitudinal_stiffness
 
 
 def axle_friction(load: Any, moved: Any, p: SimpleNamespace) -> Any:
@@ -86,9 +85,8 @@ def axle_friction(load: Any, moved: Any, p: SimpleNamespace) -> Any:
     return p.friction * ca.fmax(1 - loss, LEAST_FRICTION)
 
 
-def wrap_rate(spin: Any, brake_wrap: Any, p: SimpleNamespace) -> Any:
-    """z' (1/s). (6)"""
-    rim = p.wheel_radius * spin
+def wrap_rate(rim: Any, brake_wrap: Any) -> Any:
+    """z' (1/s) of an axle whose rim moves at R omega (m/s). (6)"""
     return (rim - ca.fabs(rim) * brake_wrap) / (WRAP_LENGTH + WRAP_TIME * ca.fabs(rim))
 
 
