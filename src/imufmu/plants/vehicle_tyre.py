@@ -1,7 +1,7 @@
 """Tyres, wheels and brakes of the vehicle: what one axle does on the road.
 
     symbol      here                unit    meaning, for one axle
-    v_s         sliding             m/s     rim minus road, along the wheel; across it, minus the contact point's velocity
+    v_s         sliding             m/s     rim minus contact point along the wheel; minus contact point across it
     omega       spin                rad/s   of the wheels
     V           transport           m/s     at which the contact patch is renewed
     w           grip                1       state: force over mu Fz, along and across the wheel
@@ -19,9 +19,9 @@ and stopping are motions like any other. With c v_s element by element,
     V = (|(Vx, Vy)| + |R omega|) / 2                                                              (3)
 
 Rolling steadily, w = G(|rho|) rho: the magic formula [1, section 4.3] of the combined slip rho / c, built up over the
-way sigma. Standing, w' = c v_s / sigma: a spring. Sliding with locked wheels, D = c |v_s| / sin(...): dry friction, which
-forgets its deflection over sigma / c, the way that the tyre's rubber gives. T_w bounds the rate. |w| <= 1 is the friction
-circle; a damper that fades with V quiets the spring of a car at rest, inside the same circle:
+way sigma. Standing, w' = c v_s / sigma: a spring. Sliding with locked wheels, D = c |v_s| / sin(...): dry friction,
+which forgets its deflection within sigma / c, the way that the rubber gives. T_w bounds the rate. |w| <= 1 is the
+friction circle; a damper that fades with V quiets the spring of a car at rest, inside the same circle:
 
     F = mu Fz w_d / max(1, |w_d|),   w_d = w + w' T_0 / (1 + (V / V_0)^2)                         (4)
 
@@ -63,7 +63,8 @@ def grip_rate(velocity: Any, rim: Any, grip: Any, stiffness: Any, p: SimpleNames
     velocity: (2,), of the contact point along and across the wheel, m/s. rim: R omega, m/s. (1) to (4)
     """
     V = (norm(velocity) + ca.fabs(rim)) / 2  # (3)
-    pull = stiffness * (ca.vertcat(rim, 0) - velocity)
+    sliding = ca.vertcat(rim, 0) - velocity
+    pull = stiffness * sliding
     rho = norm(pull) / (V + TINY)
     D = (V + TINY) * rho / ca.sin(p.tyre_shape * ca.atan(rho / p.tyre_shape))  # (2)
     rate = (pull - D * grip) / (p.relaxation_length + D * GRIP_TIME)  # (1)
