@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 import pytest
+from cars import CARS, drive
 from scipy.integrate import solve_ivp
 from scipy.interpolate import make_interp_spline
 from scipy.spatial.transform import Rotation
@@ -18,23 +18,19 @@ from vehiclemodels.vehicle_dynamics_st import vehicle_dynamics_st
 from imufmu.block import ParameterError
 from imufmu.evaluate.experiments.motions import parameter_set
 from imufmu.plants.vehicle import BLOCK
+from imufmu.plants.vehicle_driver import BRAKING, CIRCLE, HILL_START, OPEN, STEP_STEER
 from imufmu.registry import BLOCKS
-from imufmu.running import Trajectory, simulate
 from imufmu.vocabulary import GRAVITY
 
-CARS = {"ford_escort": parameters_vehicle1, "bmw_320i": parameters_vehicle2, "vw_vanagon": parameters_vehicle3}
 EVERY_CAR = pytest.mark.parametrize("car", CARS)
-OPEN, CIRCLE, STEP_STEER, LANE_CHANGE, BRAKING, SLALOM, ROUNDABOUT, HILL_START = range(8)
+SOURCES = {"ford_escort": parameters_vehicle1, "bmw_320i": parameters_vehicle2, "vw_vanagon": parameters_vehicle3}
 START = {s.name: s.start_values() for s in BLOCK.parameters}
 NO_RESISTANCE = {"drag_area": 0.0, "rolling_resistance": 0.0}
 
 
-def drive(duration: float, inputs: dict[str, Any] | None = None, step: float = 0.01, **parameters: Any) -> Trajectory:
-    return simulate(BLOCK, duration, step, inputs, parameters)
-
-
-def of(name: str, car: dict[str, float] | None = None) -> float:
-    return (car or {}).get(name, START[name][0])
+def of(name: str) -> float:
+    """Start value of a parameter, its first element."""
+    return START[name][0]
 
 
 def test_it_is_registered() -> None:
@@ -49,7 +45,7 @@ def test_a_parameter_out_of_bounds_is_refused_by_name() -> None:
 @EVERY_CAR
 def test_a_parameter_set_holds_the_figures_of_its_source(car: str) -> None:
     """Against the package commonroad-vehicle-models, which ships the tables of the source."""
-    p, given = CARS[car](), parameter_set(f"vehicle/{car}")
+    p, given = SOURCES[car](), parameter_set(f"vehicle/{car}")
     roll = [p.K_sf * p.T_f**2 / 2 - p.K_tsf, p.K_sr * p.T_r**2 / 2 - p.K_tsr]
     expected = {
         "mass": p.m,
@@ -163,7 +159,7 @@ def test_a_weave_follows_the_single_track_model_of_commonroad() -> None:
     h, duration = 0.01, 6.0
     t = np.arange(0, duration + h / 2, h)
     wheel = 0.1 * np.sin(2 * np.pi * 0.4 * t)
-    run = simulate(BLOCK, duration, h, {"steering_wheel_angle": wheel}, parameter_set("vehicle/bmw_320i") | RIGID)
+    run = drive(duration, {"steering_wheel_angle": wheel}, h, **(parameter_set("vehicle/bmw_320i") | RIGID))
     angle = make_interp_spline(t, run["steering_angle"], k=5).derivative()
     speed = make_interp_spline(t, run["speed"], k=5).derivative()
     p = parameters_vehicle2()
@@ -232,7 +228,7 @@ def test_no_axle_ever_leaves_the_friction_circle() -> None:
         "bank": rng.uniform(-0.3, 0.3, n + 1),
     }
     held = {name: np.repeat(u, 5)[: 5 * n + 1] for name, u in inputs.items()}
-    run = simulate(BLOCK, n * 0.05, 0.01, held, {"manoeuvre": OPEN, "initial_speed": 25.0})
+    run = drive(n * 0.05, held, manoeuvre=OPEN, initial_speed=25.0)
     assert run["friction_used"].max() > 0.99
     assert run["friction_used"].max() <= 1 + 1e-12  # rounding
     assert np.hypot(run["longitudinal_force"], run["lateral_force"]) == pytest.approx(

@@ -2,27 +2,20 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 import pytest
+from cars import CARS, drive
 from truth_consistency import assert_truth_consistent
 
 from imufmu.evaluate.experiments.motions import parameter_set
 from imufmu.plants.truth import MID_EUROPE
-from imufmu.plants.vehicle import BLOCK
-from imufmu.running import Trajectory, simulate
+from imufmu.plants.vehicle_driver import BRAKING, CIRCLE, HILL_START, LANE_CHANGE, OPEN, ROUNDABOUT, SLALOM, STEP_STEER
+from imufmu.running import Trajectory
 from imufmu.vocabulary import GRAVITY
 
-OPEN, CIRCLE, STEP_STEER, LANE_CHANGE, BRAKING, SLALOM, ROUNDABOUT, HILL_START = range(8)
 LEVER = {"imu_position": (0.8, -0.4, 0.6), "mount": (0.2, -0.3, 2.0)}
 FROM_REST = {"initial_speed": 0.0, "start_time": 0.5}
-CARS = ("ford_escort", "bmw_320i", "vw_vanagon")
 WIDTH, WHEELBASE = 1.61, 2.579  # m, of the default car
-
-
-def drive(duration: float, inputs: dict[str, Any] | None = None, step: float = 0.01, **parameters: Any) -> Trajectory:
-    return simulate(BLOCK, duration, step, inputs, parameters)
 
 
 def corners(run: Trajectory) -> np.ndarray:

@@ -8,21 +8,16 @@ from typing import Any
 import casadi as ca
 import numpy as np
 import pytest
+from cars import drive
 from scipy.spatial.transform import Rotation
 
 from imufmu.plants.vehicle import BLOCK
-from imufmu.plants.vehicle_driver import lane_change
+from imufmu.plants.vehicle_driver import CIRCLE, HILL_START, OPEN, lane_change
 from imufmu.plants.vehicle_tyre import grip_rate, slip_for
-from imufmu.running import Trajectory, simulate
 from imufmu.vocabulary import GRAVITY
 
-OPEN, CIRCLE, STEP_STEER, BRAKING, HILL_START = 0, 1, 2, 4, 7
 VALUES = {s.name: s.start_values()[0] if s.size == 1 else np.array(s.start_values()) for s in BLOCK.parameters}
 P = SimpleNamespace(**{name: ca.DM(value) for name, value in VALUES.items()})
-
-
-def drive(duration: float, inputs: dict[str, Any] | None = None, step: float = 0.01, **parameters: Any) -> Trajectory:
-    return simulate(BLOCK, duration, step, inputs, parameters)
 
 
 # Tyre
