@@ -323,8 +323,9 @@ def test_a_braked_car_stands_still_on_any_slope(grade: float, bank: float) -> No
     run = drive(30.0, step=0.1, **values)
     late = run.time > 15
     creep = np.linalg.norm(run["position"][late] - run["position"][-1], axis=1).max()
-    assert creep < 1e-6  # m in 15 s: the springs are at rest, nothing slides
-    assert np.linalg.norm(run["position"] - run["position"][-1], axis=1).max() < 0.05  # across: the tyres' springs
+    assert creep < 1e-9  # m in 15 s: the springs are at rest, nothing slides
+    # The tyres take the slope at their nominal friction; load changes it a little.
+    assert np.linalg.norm(run["position"] - run["position"][-1], axis=1).max() < 1e-3
     assert run["specific_force"][-1] == pytest.approx(GRAVITY * run["vertical"][-1], abs=1e-4)
     assert run["forward_speed"][-1] == pytest.approx(0, abs=1e-6)
 

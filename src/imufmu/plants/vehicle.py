@@ -16,7 +16,8 @@ Inputs reach the car through its controls, so that the truth stays smooth when a
     pedals      tau F' + F = u                                                                    (2)
     road        (tau d/dt + 1)^3 gamma = u: its second derivative is continuous                   (3)
 
-The start is the steady state of driving straight, or of standing on the slope. The tyres then carry the resistance:
+The start is the steady state of driving straight on a level or climbing road, or of standing on a slope in any
+direction. The tyres carry the resistance:
 
     F = share F_drive - z (F_brake + f_r Fz),   w = F / mu Fz,   slip(w) for the spin             (4)
 """
@@ -30,12 +31,12 @@ from typing import Any
 import casadi as ca
 
 from ..block import ContinuousBlock, Expressions
-from ..rotations import angle_of, norm
+from ..rotations import TINY, angle_of, norm
 from ..signals import Signal, State
 from ..vocabulary import FORWARD_SPEED, skeleton
 from .truth import OUTPUTS, magnetic_field, truth
-from .vehicle_body import FRONT, REAR, air_drag, axle_loads, axles, motion, steering_angle, wheel_shares
-from .vehicle_driver import path_following, pedals, resistance, steering_wheel
+from .vehicle_body import FRONT, REAR, air_drag, axle_loads, axles, motion, steering_angle, swings, wheel_shares
+from .vehicle_driver import OPEN, path_following, pedals, resistance, steering_wheel
 from .vehicle_outline import POINTS, outline
 from .vehicle_parameters import PARAMETERS
 from .vehicle_road import PITCH, ROLL, coordinate_rates, sensor_motion, up_in_road
@@ -66,34 +67,38 @@ STATE = (
 
 
 def initial(p: SimpleNamespace) -> Expressions:
-    """Driving straight at initial_speed, or standing on the slope. (4)"""
+    """Driving straight at initial_speed, or standing on the slope."""
     x = SimpleNamespace(**{state.name: ca.SX.zeros(*state.shape) for state in STATE})
     x.heading = x.reference_heading = p.heading
     x.velocity[0] = p.initial_speed
     x.grade[0], x.bank[0] = p.road_grade, p.road_bank
     up = up_in_road(x)
-
-    driven = p.manoeuvre != 0
     moving = p.initial_speed > 0
     _, held = pedals(0, x, p)
     x.brake_force = ca.if_else(moving, 0, held)
-    x.drive_force = ca.if_else(ca.logic_and(driven, moving), ca.fmax(resistance(x, p), 0), 0)
-    weight = p.mass * p.g * up[0]
-    friction = x.brake_force + p.rolling_resistance * p.mass * p.g * up[2]
-    z = ca.if_else(moving, 1, ca.fmax(ca.fmin(weight / -friction, 1), -1))
-    x.brake_wrap = ca.vertcat(z, z)
+    x.drive_force = ca.if_else(ca.logic_and(p.manoeuvre != OPEN, moving), ca.fmax(resistance(x, p), 0), 0)
 
-    along = x.drive_force - z * friction - air_drag(x, p)
-    swing = p.body_mass * p.body_com_height
-    x.body_angle[PITCH] = -swing * along / p.mass / (p.pitch_stiffness - swing * p.g * up[2])
+    friction = x.brake_force + p.rolling_resistance * p.mass * p.g * up[2]
+    pulled = -p.mass * p.g * up[0] / ca.fmax(friction, TINY)  # downhill, over what the dry friction can hold
+    z = ca.if_else(moving, 1, within(pulled, 1))
+    x.brake_wrap = ca.vertcat(z, z)
+    f_x = (x.drive_force - z * friction - air_drag(x, p)) / p.mass
+    swing_x, swing_y = swings(p)
+    x.body_angle[PITCH] = -swing_x * f_x / (p.pitch_stiffness - swing_x * p.g * up[2])
+    x.body_angle[ROLL] = swing_y * p.g * up[1] / (p.roll_stiffness - swing_y * p.g * up[2])
     load = axle_loads(x, p)
     for i, (drive, largest) in enumerate(wheel_shares(x, p, load)):
-        grip = (drive - z * largest) / (p.friction * load[i])
-        grip = ca.fmax(ca.fmin(grip, NEARLY_ALL), -NEARLY_ALL)
-        slip = slip_for(grip, p)
-        x.grip[i, 0] = grip
-        x.spin[i] = p.initial_speed * (1 + slip / 2) / (1 - slip / 2) / p.wheel_radius
+        along = within((drive - z * largest) / (p.friction * load[i]), NEARLY_ALL)
+        slip = slip_for(along, p)
+        across = within(up[1] / (p.friction * up[2]), NEARLY_ALL)
+        x.grip[i, 0], x.grip[i, 1] = along, ca.if_else(moving, 0, across)
+        x.spin[i] = p.initial_speed * (1 + slip / 2) / (1 - slip / 2) / p.wheel_radius  # (4)
     return vars(x)
+
+
+def within(value: Any, limit: Any) -> Any:
+    """The value, or the nearer of +-limit."""
+    return ca.fmax(ca.fmin(value, limit), -limit)
 
 
 def dynamics(x: SimpleNamespace, u: SimpleNamespace, p: SimpleNamespace, t: Any) -> Expressions:

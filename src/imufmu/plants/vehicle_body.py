@@ -4,7 +4,8 @@
     vx, vy, r     x.velocity, x.yaw_rate        m/s, rad/s    along the road's axes, about its normal
     phi, theta    x.body_angle                  rad           roll, pitch of the body
     m, m_s        p.mass, p.body_mass           kg            of the whole car, of the body on its springs
-    h, h_s        roll arm, p.body_com_height   m             body's centre of mass above the roll axis, above the road
+    h_s           p.body_com_height             m             body's centre of mass above the road
+    h = h_s - h_a p.roll_axis_height (h_a)      m             body's centre of mass above the roll axis
     a, b          p.front_distance, p.rear_distance   m       axles from the centre of mass
     f = a - g     f                             m/s2          acceleration minus gravity, along the road's axes
     up            up_in_road                    1             unit vector that points up, along the road's axes
@@ -44,6 +45,11 @@ FRONT, REAR = 0, 1
 def wheelbase(p: SimpleNamespace) -> Any:
     """Distance between the axles (m)."""
     return p.front_distance + p.rear_distance
+
+
+def swings(p: SimpleNamespace) -> tuple[Any, Any]:
+    """Mass of the body times its height above the axes of pitch and roll (kg.m)."""
+    return p.body_mass * p.body_com_height, p.body_mass * (p.body_com_height - p.roll_axis_height)
 
 
 def steering_angle(x: SimpleNamespace, p: SimpleNamespace) -> Any:
@@ -98,6 +104,15 @@ def air_drag(x: SimpleNamespace, p: SimpleNamespace) -> Any:
     return p.air_density / 2 * p.drag_area * ca.fabs(x.velocity[0]) * x.velocity[0]
 
 
+def wheel_shares(x: SimpleNamespace, p: SimpleNamespace, load: tuple[Any, Any]) -> tuple[tuple[Any, Any], ...]:
+    """Drive force and largest dry friction (N) of the front and of the rear axle."""
+    drive = p.front_drive_share, 1 - p.front_drive_share
+    brake = p.front_brake_share, 1 - p.front_brake_share
+    return tuple(
+        (drive[i] * x.drive_force, brake[i] * x.brake_force + p.rolling_resistance * load[i]) for i in (FRONT, REAR)
+    )
+
+
 def motion(x: SimpleNamespace, p: SimpleNamespace) -> dict[str, Any]:
     """Time derivative of the states velocity, yaw_rate, body_rate, spin, grip, brake_wrap."""
     wheel = axles(x, p)
@@ -107,8 +122,7 @@ def motion(x: SimpleNamespace, p: SimpleNamespace) -> dict[str, Any]:
     X, Y = front_x + wheel.along[REAR] - air_drag(x, p), front_y + wheel.across[REAR]
 
     roll_moment, pitch_moment = spring_moments(x, p)
-    swing_x = p.body_mass * p.body_com_height
-    swing_y = p.body_mass * (p.body_com_height - p.roll_axis_height)
+    swing_x, swing_y = swings(p)
     topple = p.g * up[2] * ca.sin(x.body_angle)
     # (1) solved for f, and put into (2) and (3).
     roll_inertia = p.roll_inertia + swing_y**2 * (1 / p.body_mass - 1 / p.mass)
@@ -132,13 +146,4 @@ def motion(x: SimpleNamespace, p: SimpleNamespace) -> dict[str, Any]:
         ),
         grip=ca.vertcat(*wheel.grip_rate),
         brake_wrap=ca.vertcat(*(wrap_rate(p.wheel_radius * x.spin[i], x.brake_wrap[i]) for i in (FRONT, REAR))),
-    )
-
-
-def wheel_shares(x: SimpleNamespace, p: SimpleNamespace, load: tuple[Any, Any]) -> tuple[tuple[Any, Any], ...]:
-    """Drive force and largest dry friction (N) of the front and of the rear axle."""
-    drive = p.front_drive_share, 1 - p.front_drive_share
-    brake = p.front_brake_share, 1 - p.front_brake_share
-    return tuple(
-        (drive[i] * x.drive_force, brake[i] * x.brake_force + p.rolling_resistance * load[i]) for i in (FRONT, REAR)
     )

@@ -62,6 +62,7 @@ HOLDING = 0.6  # brake force at standstill over weight: holds on a slope of 30 d
 RELEASE_TIME = 0.5  # s: from brake to drive
 PEDAL_TIME = 0.3  # s: to full braking
 LARGEST_ANGLE = 0.6  # rad, front wheels
+NEAR_CENTRE = 0.1  # of the radius: a car this near to the centre of the circle has lost its path anyway
 
 
 def lane_widths(width: Any) -> tuple[Any, Any, Any]:
@@ -130,7 +131,7 @@ def path_following(x: SimpleNamespace, p: SimpleNamespace) -> tuple[dict[str, An
     x_ref = ca.dot(start, x.reference)
 
     kappa = curvature(x.path_distance, x_ref, p)
-    s_rate = ca.dot(ahead, velocity) / (1 - kappa * e)
+    s_rate = ca.dot(ahead, velocity) / ca.fmax(1 - kappa * e, NEAR_CENTRE)
     rates = dict(path_distance=s_rate, reference=s_rate * ahead, reference_heading=kappa * s_rate)  # (1)
 
     v = x.velocity[0]

@@ -20,8 +20,9 @@ and stopping are motions like any other. With c v_s element by element,
 
 Rolling steadily, w = G(|rho|) rho: the magic formula [1, section 4.3] of the combined slip rho / c, built up over the
 way sigma. Standing, w' = c v_s / sigma: a spring. Sliding with locked wheels, D = c |v_s| / sin(...): dry friction,
-which forgets its deflection within sigma / c, the way that the rubber gives. T_w bounds the rate. |w| <= 1 is the
-friction circle; a damper that fades with V quiets the spring of a car at rest, inside the same circle:
+which forgets its deflection within sigma / c, the way that the rubber gives. T_w bounds the rate and adds V T_w to
+sigma: 2 cm at 20 m/s. |w| <= 1 is the friction circle; a damper that fades with V quiets the spring of a car at rest,
+inside the same circle:
 
     F = mu Fz w_d / max(1, |w_d|),   w_d = w + w' T_0 / (1 + (V / V_0)^2)                         (4)
 
