@@ -202,7 +202,7 @@ def test_the_forces_of_the_road_are_the_momentum_of_body_and_axles(manoeuvre: in
     )
     largest = np.abs(force).max()
     assert largest > 6000
-    # Products of body angles (0.1 rad), their rates and the yaw rate (0.4 rad/s) are left out of the equations of motion.
+    # Products of body angles (0.1 rad), their rates and the yaw rate (0.4 rad/s) are left out of the equations.
     assert np.abs(momentum - force).max() < 0.01 * largest
 
 

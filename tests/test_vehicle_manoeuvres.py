@@ -158,6 +158,15 @@ def test_the_roundabout_keeps_radius_and_speed_and_leaves() -> None:
     assert run["yaw"][-1] == pytest.approx(0.0, abs=0.01)  # whole laps: out in the direction of the entry
 
 
+def test_the_driver_waits_and_then_drives_the_speed_profile() -> None:
+    run = drive(12.0, manoeuvre=HILL_START, initial_speed=0.0, final_speed=10.0, speed_rate=2.0, start_time=3.0)
+    assert run["speed"][run.time <= 3.0].max() < 1e-6
+    ramp = (run.time > 5.0) & (run.time < 7.9)
+    # The driver's correction of 1/s starts late by the time that brake and drive take to change over.
+    assert run["speed"][ramp] == pytest.approx(2.0 * (run.time[ramp] - 3.0), abs=0.5)
+    assert run["speed"][-1] == pytest.approx(10.0, abs=0.05)
+
+
 @pytest.mark.parametrize("car", CARS)
 @pytest.mark.parametrize("grade", [0.0, 0.15, 0.3])
 def test_a_hill_start_does_not_roll_back(car: str, grade: float) -> None:

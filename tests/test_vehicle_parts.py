@@ -12,7 +12,7 @@ from cars import drive
 from scipy.spatial.transform import Rotation
 
 from imufmu.plants.vehicle import BLOCK
-from imufmu.plants.vehicle_driver import CIRCLE, HILL_START, OPEN, lane_change
+from imufmu.plants.vehicle_driver import BRAKING, CIRCLE, HILL_START, OPEN, STEP_STEER, lane_change
 from imufmu.plants.vehicle_tyre import grip_rate, slip_for
 from imufmu.vocabulary import GRAVITY
 
@@ -43,6 +43,14 @@ def test_a_rolling_tyre_settles_on_the_magic_formula_of_the_combined_slip(slip: 
     rate, damped = tyre((along, across), rim, expected, tuple(c))
     assert rate == pytest.approx([0, 0], abs=1e-9)  # 1/s, rounding of 20 m/s over 0.3 m
     assert damped == pytest.approx(expected, abs=1e-12)
+
+
+def test_a_tyre_builds_up_its_force_over_its_relaxation_length() -> None:
+    """From no grip at 20 m/s and a small slip: rate c s V / (sigma + V T_w), T_w = 1 ms."""
+    speed, slip = 20.0, 1e-4
+    rate, _ = tyre((speed, -slip * speed), speed, (0.0, 0.0), (19.0, 21.0))
+    expected = 21.0 * slip * speed / (VALUES["relaxation_length"] + speed * 1e-3)
+    assert rate[1] == pytest.approx(expected, rel=1e-5)  # (c s)^2 / 3 and more of saturation
 
 
 def test_the_grip_of_a_slip_and_the_slip_of_a_grip_are_inverse() -> None:
@@ -133,6 +141,33 @@ def test_a_step_of_the_grade_comes_through_three_lags() -> None:
     s = run.time / tau
     # RK4 at 1 ms, a two-hundredth of tau.
     assert run["road"][:, 0] == pytest.approx(to * (1 - np.exp(-s) * (1 + s + s**2 / 2)), abs=1e-9)
+
+
+def test_a_step_of_the_steering_wheel_comes_through_two_lags() -> None:
+    tau = VALUES["steering_time"]
+    run = drive(0.5, {"steering_wheel_angle": 1.6}, step=1e-3, manoeuvre=OPEN, initial_speed=0.0)
+    s = run.time / tau
+    # RK4 at 1 ms, a thirtieth of tau: (1 / 30)^4 / 120 and less.
+    assert run["steering_angle"] == pytest.approx(0.1 * (1 - np.exp(-s) * (1 + s)), abs=1e-8)
+
+
+@pytest.mark.parametrize("manoeuvre", [STEP_STEER, BRAKING])
+def test_roll_and_pitch_swing_by_their_inertia(manoeuvre: int) -> None:
+    """(2) and (3) with the second derivatives of the reported angles, on a level road."""
+    h = 1e-3
+    run = drive(2.5, step=h, manoeuvre=manoeuvre, step_angle=0.5, g=9.81)
+    rows = slice(5, -5)  # one-sided differences at the ends
+    across, along = run["lateral_acceleration"][rows], run["longitudinal_acceleration"][rows]
+    swing = VALUES["body_mass"] * VALUES["body_com_height"]
+    for name, pulled in (("roll", swing * across), ("pitch", -swing * along)):
+        angle = run[f"body_{name}"]
+        rate = np.gradient(angle, h)
+        acceleration = np.gradient(rate, h)[rows]
+        inertia = VALUES[f"{name}_inertia"] + swing * VALUES["body_com_height"]
+        springs = VALUES[f"{name}_stiffness"] * angle[rows] + VALUES[f"{name}_damping"] * rate[rows]
+        moment = pulled + swing * 9.81 * np.sin(angle[rows]) - springs
+        # Differences of 1 ms of a swing of 20 rad/s.
+        assert inertia * acceleration == pytest.approx(moment, abs=1e-3 * max(np.abs(springs).max(), 100.0))
 
 
 def test_yaw_rate_is_the_turn_about_the_normal_of_the_road() -> None:
