@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from functools import lru_cache
+from pathlib import Path
 
 import numpy as np
 import pytest
 from motions import angle
 
 from imufmu.cosim import Result, System, locate, simulate
+from imufmu.locations import models_folder
 from imufmu.registry import BLOCKS
 from imufmu.running import run
 
@@ -67,6 +71,13 @@ def test_the_error_of_lee2012_in_the_roundabout_is_that_of_the_accelerometer() -
     lean = np.arctan(result["plant.lateral_acceleration"][steady] / result["plant.specific_force"][steady, 2])
     assert np.mean(error) > 0.6 * np.mean(lean)
     assert np.ptp(error) < np.radians(0.5)  # it does not recover
+
+
+@pytest.mark.slow
+def test_the_figure_of_the_readme_is_drawn_by_its_command(tmp_path: Path) -> None:
+    script, target = models_folder() / "vehicle" / "draw.py", tmp_path / "vehicle.png"
+    subprocess.run([sys.executable, script, target], check=True)
+    assert target.read_bytes().startswith(b"\x89PNG")
 
 
 def test_the_braking_car_comes_to_rest() -> None:
