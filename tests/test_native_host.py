@@ -6,25 +6,29 @@ import shutil
 import subprocess
 import sys
 import zipfile
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-import fmpy
 import numpy as np
 import pytest
 
 from imufmu.block import SampledBlock
-from imufmu.fmi.compilers import PLATFORMS, has_ziglang, own_platform
+from imufmu.fmi.compilers import PLATFORMS, compile_program, has_ziglang, own_platform
 from imufmu.fmi.model_description import guid
 from imufmu.fmi.native import block_called, build_native
 from imufmu.instance import instantiate
+from imufmu.locations import fmu_src_folder
 from imufmu.registry import BLOCKS
 
 STEPS, H = 50, 0.01
-HOST = Path(__file__).with_name("host.c")
-HEADERS = Path(fmpy.__file__).parent / "c-code"
+HOST = fmu_src_folder() / "host" / "host.c"
 ZIG = has_ziglang()
 ARM_SYSTEM = Path("/usr/aarch64-linux-gnu")  # where Debian's libc6-arm64-cross puts the C library
+
+
+def inputs(count: int) -> np.ndarray:
+    """What the block is fed, (STEPS, count)."""
+    return np.array([[((i + 3 * k) % 7 - 3) / 4 for i in range(max(1, count))] for k in range(STEPS)])
 
 
 def in_process(name: str) -> np.ndarray:
@@ -32,43 +36,40 @@ def in_process(name: str) -> np.ndarray:
     instance = instantiate(block_called(name))
     instance.initialise(0.0)
     rows = []
-    for k in range(STEPS):
-        instance.u[:] = [((i + 3 * k) % 7 - 3) / 4 for i in range(len(instance.u))]
+    for k, u in enumerate(inputs(len(instance.u))):
+        instance.u[:] = u[: len(instance.u)]
         instance.do_step(k * H, H)
         rows.append(instance.y.copy())
     return np.array(rows)
 
 
-def in_host(name: str, runner: Sequence[str], host: Path, folder: Path, platform: str) -> np.ndarray:
-    """What it prints, with an empty environment."""
+def in_host(
+    name: str,
+    runner: Sequence[str],
+    host: Path,
+    folder: Path,
+    platform: str,
+    environment: Mapping[str, str] | None = None,
+) -> np.ndarray:
+    """What it prints, with an empty environment unless one is given."""
     fmu, block = build_native(name, folder, [platform]), block_called(name)
     library = f"binaries/{platform}/{block.name}{PLATFORMS[platform].suffix}"
     with zipfile.ZipFile(fmu) as archive:
         archive.extract(library, folder)
     sizes = [sum(s.size for s in signals) for signals in (block.inputs, block.parameters, block.reported)]
-    arguments = [guid(block, native=True), str(STEPS), str(H), str(sizes[0]), str(sizes[0] + sizes[1]), str(sizes[2])]
-    run = subprocess.run(
-        [*runner, str(host), str(folder / library), *arguments], capture_output=True, text=True, env={}
-    )
+    (folder / "record").write_bytes(inputs(sizes[0]).tobytes())
+    arguments = [guid(block, native=True), folder / "record", sizes[0], sizes[0] + sizes[1], sizes[2], H, 0]
+    command = [*runner, host, folder / library, *arguments]
+    run = subprocess.run([str(part) for part in command], capture_output=True, text=True, env=environment or {})
     assert run.returncode == 0, run.stderr
     return np.array([[float(value) for value in line.split()] for line in run.stdout.splitlines()])
 
 
-def compile_host(folder: Path, compiler: Sequence[str], suffix: str = "") -> Path:
-    host = folder / f"host{suffix}"
-    libraries = [] if suffix else ["-ldl"]
-    subprocess.run([*compiler, "-std=c99", f"-I{HEADERS}", str(HOST), "-o", str(host), *libraries], check=True)
-    return host
-
-
-def zig(target: str) -> list[str]:
-    return [sys.executable, "-m", "ziglang", "cc", "-target", target]
-
-
 @pytest.fixture(scope="module")
 def host(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    compiler = zig("native") if ZIG and not shutil.which("cc") else ["cc"]
-    return compile_host(tmp_path_factory.mktemp("host"), compiler)
+    program = tmp_path_factory.mktemp("host") / "host"
+    compile_program(HOST, program)
+    return program
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="the host is built for POSIX systems here")
@@ -90,7 +91,8 @@ PORTABLE = [name for name, block in BLOCKS.items() if isinstance(block, SampledB
 @pytest.mark.skipif(not (ZIG and shutil.which("wine")), reason="needs ziglang and wine")
 @pytest.mark.parametrize("name", PORTABLE)
 def test_the_windows_build_gets_the_same_numbers_under_wine(name: str, tmp_path: Path) -> None:
-    program = compile_host(tmp_path, zig("x86_64-windows-gnu"), ".exe")
+    program = tmp_path / "host.exe"
+    compile_program(HOST, program, PLATFORMS["win64"])
     close(name, in_host(name, ["wine"], program, tmp_path, "win64"))
 
 
@@ -100,5 +102,6 @@ def test_the_windows_build_gets_the_same_numbers_under_wine(name: str, tmp_path:
 )
 @pytest.mark.parametrize("name", PORTABLE)
 def test_the_arm_build_gets_the_same_numbers_under_qemu(name: str, tmp_path: Path) -> None:
-    program = compile_host(tmp_path, zig("aarch64-linux-gnu.2.17"))
+    program = tmp_path / "host"
+    compile_program(HOST, program, PLATFORMS["aarch64-linux"])
     close(name, in_host(name, ["qemu-aarch64", "-L", str(ARM_SYSTEM)], program, tmp_path, "aarch64-linux"))

@@ -63,19 +63,20 @@ def simulate(
     parameters: Mapping[str, Any] | None = None,
     record: Sequence[str] | None = None,
     jacobi: bool = False,
+    native: bool = False,
     progress: Progress | None = None,
 ) -> Result:
     """Run a system: a System, a file (.ssd, .ssp), or the name of a system of imufmu.
 
     Times in s; what is not given comes from the description, a step also from the FMUs (the smallest they prefer).
     parameters: start values by ``component.variable``, a vector by its name. record: names of variables or vectors
-    (default: all outputs). progress(done, total), in ticks, is called now and then.
+    (default: all outputs). native: as in System.read. progress(done, total), in ticks, is called now and then.
 
     Raises WiringError and what System.read raises for a system that does not fit, ValueError for impossible times,
     SimulationError for a run that fails. Whatever happens, no instance and no temporary file stays behind.
     """
     if not isinstance(system, System):
-        system = System.read(locate(system))
+        system = System.read(locate(system), native=native)
     settings = system.settings_with(parameters or {})
     ticks = _ticks(system, start_time, stop_time, step)
     exchange = Exchange(system, record)

@@ -14,12 +14,12 @@ from .system import STRUCTURE, System
 _FIXED_TIME = (1980, 1, 1, 0, 0, 0)  # the earliest a zip can say: equal contents make equal bytes
 
 
-def pack(ssd: str | Path, target: str | Path) -> Path:
+def pack(ssd: str | Path, target: str | Path, *, native: bool = False) -> Path:
     """Write the system described by ``ssd``, with its FMUs and parameter sets under ``resources/``, to ``target``.
 
-    Returns the path written. Raises what System.read raises, and WriteError.
+    native: as in System.read. Returns the path written. Raises what System.read raises, and WriteError.
     """
-    system = System.read(ssd)
+    system = System.read(ssd, native=native)
     root = read_xml(system.description.path, "SystemStructureDescription")
     files = Sources(system.description.path, None)
     members: dict[str, Path] = {}

@@ -13,6 +13,7 @@ from typing import Any
 
 from ..archives import ArchiveError, read_fmu, unpack
 from ..fmi.build import cached_fmu
+from ..fmi.native import cached_native_fmu
 from ..locations import models_folder
 from ..registry import BLOCKS
 from .description import Component, Description, DescriptionError, read_description
@@ -47,21 +48,22 @@ class System:
     notes: tuple[str, ...]
 
     @staticmethod
-    def read(path: str | Path) -> System:
+    def read(path: str | Path, *, native: bool = False) -> System:
         """Read an .ssd or .ssp file.
 
-        An FMU that is not where the .ssd says, but is named after a block of imufmu, is built into the user's cache.
-        Raises DescriptionError, ArchiveError (FMU, archive or XML unfit) or WiringError (all misfits at once).
+        An FMU that is not where the .ssd says, but is named after a block of imufmu, is built into the user's cache: in
+        Python, or with ``native`` as compiled C. An FMU that is there is taken as it is. Raises DescriptionError,
+        ArchiveError (FMU, archive or XML unfit), BuildError or WiringError (all misfits at once).
         """
         path = Path(path).resolve()
         if path.suffix.lower() != ".ssp":
-            return _read(path)
+            return _read(path, native)
         folder = str(Path(tempfile.mkdtemp(prefix="imufmu_ssp_")).resolve())
         try:
             unpack(path, Path(folder))
             if not (Path(folder) / STRUCTURE).is_file():
                 raise ArchiveError(f"{path}: {STRUCTURE} is missing: this is no SSP")
-            system = replace(_read(Path(folder) / STRUCTURE, inside=Path(folder)), path=path)
+            system = replace(_read(Path(folder) / STRUCTURE, native, inside=Path(folder)), path=path)
         except BaseException as error:
             shutil.rmtree(folder, ignore_errors=True)
             # A user knows the archive, not the folder that it was unpacked to.
@@ -96,14 +98,14 @@ def locate(name: str | Path) -> Path:
     return systems[str(name)]
 
 
-def _read(path: Path, inside: Path | None = None) -> System:
+def _read(path: Path, native: bool, inside: Path | None = None) -> System:
     """Read an .ssd; ``inside``: the folder that its files must not leave."""
     description = read_description(path, inside)
     _check_names(description)
     models: dict[Path, Any] = {}
     parts = []
     for component in description.components:
-        fmu = _fmu_file(component, path)
+        fmu = _fmu_file(component, path, native)
         if fmu not in models:
             models[fmu] = read_fmu(fmu)
         parts.append(Part(component.name, fmu, models[fmu]))
@@ -129,12 +131,12 @@ def _check_names(description: Description) -> None:
             raise DescriptionError(f"{where}: the name occurs twice; rename one of them")
 
 
-def _fmu_file(component: Component, path: Path) -> Path:
+def _fmu_file(component: Component, path: Path, native: bool) -> Path:
     """The component's FMU, built if it is one of ours and not there."""
     if component.source.is_file():
         return component.source
     if component.source.stem in BLOCKS:
-        return cached_fmu(component.source.stem)
+        return (cached_native_fmu if native else cached_fmu)(component.source.stem)
     raise DescriptionError(
         f"{path}, line {component.line}: component {component.name!r}: there is no file {component.source}, and no "
         f"block of imufmu is called {component.source.stem!r}; there is {', '.join(BLOCKS)}"

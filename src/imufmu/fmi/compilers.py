@@ -21,6 +21,8 @@ import fmpy
 
 from .build import BuildError
 
+HEADERS = Path(fmpy.__file__).parent / "c-code"  # of the FMI standard
+
 # Old systems on purpose: what runs on them runs on all later ones. glibc 2.17 is of 2012, macOS 10.13 of 2017.
 _LINUX = {"x86_64": "x86_64-linux-gnu.2.17", "aarch64": "aarch64-linux-gnu.2.17"}
 _MACOS = {"x86_64": "x86_64-macos.10.13", "aarch64": "aarch64-macos.11.0"}
@@ -90,6 +92,15 @@ def commands(platform: Platform, name: str) -> list[list[str]]:
     return [[*_system_compiler(), *both, *_FLAGS, *_linking(platform, name)]]
 
 
+def compile_program(source: Path, target: Path, platform: Platform | None = None) -> None:
+    """Make a program for a platform, the one at hand without. Raises BuildError with what the compiler said."""
+    target_flags = ["-target", platform.targets[0]] if platform else []
+    compiler = [sys.executable, "-m", "ziglang", "cc", *target_flags] if has_ziglang() else _system_compiler()
+    suffix = (platform or PLATFORMS[own_platform()]).suffix
+    libraries = ["-ldl"] if suffix == ".so" else []
+    _compile([*compiler, "-std=c11", "-O2", f"-I{HEADERS}", str(source), "-o", str(target), *libraries], source)
+
+
 def identity() -> str:
     """Which compiler ``commands`` uses, with its version."""
     if has_ziglang():
@@ -121,13 +132,16 @@ def compile_library(calls: list[list[str]], source: Path, target: Path) -> None:
     parts = []
     for i, call in enumerate(calls):
         part = target.with_name(f"{i}_{target.name}")
-        command = [*call, str(source), "-o", str(part), *_LIBRARIES.get(target.suffix, ())]
-        made = subprocess.run(command, capture_output=True, text=True, errors="replace")
-        if made.returncode:
-            said = [line for line in made.stderr.splitlines() if "error" in line] or made.stderr.splitlines()
-            raise BuildError(f"{shlex.join(call[:5])} failed on {source}:\n" + "\n".join(said[:5]))
+        _compile([*call, str(source), "-o", str(part), *_LIBRARIES.get(target.suffix, ())], source)
         parts.append(part.read_bytes())
     target.write_bytes(parts[0] if len(parts) == 1 else universal(parts))
+
+
+def _compile(command: list[str], source: Path) -> None:
+    made = subprocess.run(command, capture_output=True, text=True, errors="replace")
+    if made.returncode:
+        said = [line for line in made.stderr.splitlines() if "error" in line] or made.stderr.splitlines()
+        raise BuildError(f"{shlex.join(command[:5])} failed on {source}:\n" + "\n".join(said[:5]))
 
 
 def universal(libraries: list[bytes]) -> bytes:

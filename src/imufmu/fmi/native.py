@@ -14,7 +14,6 @@ from concurrent.futures import ThreadPoolExecutor, as_completed
 from pathlib import Path
 from xml.etree.ElementTree import indent, tostring
 
-import fmpy
 from platformdirs import user_cache_path
 
 from .. import __version__
@@ -26,7 +25,7 @@ from ..series import series
 from ..signals import DeclarationError
 from .build import BuildError, source_digest, write_archive
 from .codegen import generate
-from .compilers import PLATFORMS, Platform, commands, compile_library, identity, own_platform
+from .compilers import HEADERS, PLATFORMS, Platform, commands, compile_library, identity, own_platform
 from .documentation import documentation_page, icon
 from .model_description import NATIVE_SOURCE, model_description
 
@@ -86,7 +85,7 @@ def block_called(name: str) -> Block:
 
 def sources(block: Block) -> dict[str, bytes]:
     """C source by file name, complete: the generated files, the wrapper, and the headers of the FMI standard."""
-    headers = [Path(fmpy.__file__).parent / "c-code" / header for header in _HEADERS]
+    headers = [HEADERS / header for header in _HEADERS]
     written = {path.name: path.read_bytes() for path in (*_wrapper(), *headers)}
     return written | {file: text.encode() for file, text in generate(block).items()}
 

@@ -1,0 +1,196 @@
+"""Ways to run a block over one record, each with the time that it takes per sample.
+
+A round trip of an FMU is: set the inputs, fmi2DoStep, get the outputs. In a C host that is all that happens. Python
+calls C functions through ctypes, with arrays made beforehand; what that adds shows where the same native FMU runs in
+both. A Python FMU runs through ctypes only: in a C host it would need libpython.
+"""
+
+from __future__ import annotations
+
+import subprocess
+from collections.abc import Callable, Mapping
+from contextlib import ExitStack
+from ctypes import CDLL, c_double, c_int, c_size_t, c_void_p, cast
+from dataclasses import dataclass
+from importlib.util import find_spec
+from pathlib import Path
+from time import perf_counter
+from typing import Any
+
+import fmpy
+import numpy as np
+from fmpy.fmi2 import FMU2Slave
+
+from ..archives import open_fmu
+from ..block import SampledBlock
+from ..cosim import SimulationError
+from ..fmi.build import cached_fmu
+from ..fmi.compilers import compile_program
+from ..fmi.native import cached_native_fmu
+from ..locations import fmu_src_folder
+from ..running import Stream, run
+from ..signals import total_size
+
+NATIVE_IN_C = "native FMU, C host"
+
+_SAMPLES = {"C": 300_000, "ctypes": 20_000, "Python": 2_000}  # of one measurement, about: tens of milliseconds each
+
+
+@dataclass(frozen=True)
+class Trip:
+    """A block and what it is fed: inputs (n, k) by name, one row per ``period`` (s)."""
+
+    block: SampledBlock
+    period: float
+    inputs: Mapping[str, np.ndarray]
+
+    @property
+    def rows(self) -> np.ndarray:
+        """The inputs in the order of the block, (n, number of inputs)."""
+        return np.ascontiguousarray(np.hstack([self.inputs[s.name] for s in self.block.inputs]))
+
+    @property
+    def first_output(self) -> int:
+        """Value reference of the first output."""
+        return total_size(self.block.inputs) + total_size(self.block.parameters)
+
+    @property
+    def outputs(self) -> int:
+        """Number of outputs with ``sample_time``."""
+        return total_size(self.block.outputs) + 1
+
+    @property
+    def period_reference(self) -> int:
+        """Value reference of the sample period."""
+        names = [v.name for v in self.block.variables if v.group == "parameter"]
+        return total_size(self.block.inputs) + names.index("sample_period")
+
+
+def ways(trip: Trip, folder: Path, stack: ExitStack) -> dict[str, Callable[[], float]]:
+    """By name, functions that measure once and return the time of a sample (s).
+
+    folder: for the files that they need, until the stack closes what they have opened. Raises BuildError without a C
+    compiler.
+    """
+    library, model = open_fmu(cached_native_fmu(trip.block.name), _new(folder / "native"))
+    found: dict[str, Callable[[], float]] = {
+        NATIVE_IN_C: in_c_host(trip, library, model.guid, folder),
+        "native FMU, ctypes": through_ctypes(trip, cached_native_fmu(trip.block.name), _SAMPLES["ctypes"], stack),
+        "Python FMU, ctypes": through_ctypes(trip, cached_fmu(trip.block.name), _SAMPLES["Python"], stack),
+        "in process, Stream": in_stream(trip),
+        "in process, run": on_arrays(trip),
+    }
+    if find_spec("vqf") and {"gyro", "accel"} <= set(trip.inputs):
+        found["VQF (C++), updateBatch"] = in_vqf(trip)
+    return found
+
+
+def in_c_host(trip: Trip, library: Path, guid: str, folder: Path) -> Callable[[], float]:
+    """The native FMU in fmu_src/host, a process of its own for every measurement."""
+    host, record = folder / "host.exe", folder / "record.bin"
+    if not host.is_file():
+        compile_program(fmu_src_folder() / "host" / "host.c", host)
+    record.write_bytes(trip.rows.tobytes())
+    n, width = trip.rows.shape
+    rounds = max(1, _SAMPLES["C"] // n)
+    numbers = [width, trip.first_output, trip.outputs, repr(trip.period), rounds]
+    command = [host, library, guid, record, *numbers, f"{trip.period_reference}={trip.period!r}"]
+
+    def measure() -> float:
+        done = subprocess.run([str(part) for part in command], capture_output=True, text=True, check=True)
+        return 1e-9 * float(done.stdout)
+
+    return measure
+
+
+def through_ctypes(trip: Trip, fmu: Path, samples: int, stack: ExitStack) -> Callable[[], float]:
+    """An FMU in this process, by its C functions."""
+    model = fmpy.read_model_description(str(fmu))
+    folder = fmpy.extract(str(fmu))
+    slave = FMU2Slave(
+        guid=model.guid,
+        unzipDirectory=folder,
+        modelIdentifier=model.coSimulation.modelIdentifier,
+        instanceName=f"speed_{trip.block.name}",
+    )
+    slave.instantiate()
+    stack.callback(slave.freeInstance)
+    slave.setReal([trip.period_reference], [trip.period])
+    slave.setupExperiment(startTime=0.0)
+    slave.enterInitializationMode()
+    slave.exitInitializationMode()
+    calls = CDLL(str(slave.dll._name))  # the same library, loaded once: functions without FMPy's argument types
+    instance, rows = c_void_p(cast(slave.component, c_void_p).value), trip.rows
+    u, y = np.zeros(rows.shape[1]), np.zeros(trip.outputs)
+    u_at, y_at = np.arange(len(u), dtype=np.uint32), trip.first_output + np.arange(len(y), dtype=np.uint32)
+    to_set, to_get = (
+        (instance, at.ctypes.data_as(c_void_p), c_size_t(len(at)), values.ctypes.data_as(c_void_p))
+        for at, values in ((u_at, u), (y_at, y))
+    )
+    h, yes = c_double(trip.period), c_int(1)
+    done = 0
+
+    def measure() -> float:
+        nonlocal done
+        set_real, do_step, get_real = calls.fmi2SetReal, calls.fmi2DoStep, calls.fmi2GetReal
+        began = perf_counter()
+        for k in range(done, done + samples):
+            u[:] = rows[k % len(rows)]
+            statuses = set_real(*to_set)
+            statuses |= do_step(instance, c_double(k * trip.period), h, yes)
+            statuses |= get_real(*to_get)
+            if statuses:
+                raise SimulationError(f"{fmu}: a call failed at t = {k * trip.period:g} s")
+        took = perf_counter() - began
+        done += samples
+        return took / samples
+
+    return measure
+
+
+def in_stream(trip: Trip) -> Callable[[], float]:
+    """The streaming object, sample by sample."""
+    stream = Stream(trip.block, {"sample_period": trip.period})
+    count = min(_SAMPLES["Python"], len(trip.rows))
+    samples = [{name: values[k] for name, values in trip.inputs.items()} for k in range(count)]
+
+    def measure() -> float:
+        began = perf_counter()
+        for sample in samples:
+            stream.update(**sample)
+        return (perf_counter() - began) / len(samples)
+
+    return measure
+
+
+def on_arrays(trip: Trip) -> Callable[[], float]:
+    """The whole record in one call."""
+
+    def measure() -> float:
+        began = perf_counter()
+        run(trip.block, trip.inputs, {"sample_period": trip.period})
+        return (perf_counter() - began) / len(trip.rows)
+
+    return measure
+
+
+def in_vqf(trip: Trip) -> Callable[[], float]:
+    """VQF's C++ loop over whole records."""
+    import vqf
+
+    filter_: Any = vqf.VQF(trip.period)
+    gyro, accel = (np.ascontiguousarray(trip.inputs[name]) for name in ("gyro", "accel"))
+    rounds = max(1, _SAMPLES["C"] // len(gyro))
+
+    def measure() -> float:
+        began = perf_counter()
+        for _ in range(rounds):
+            filter_.updateBatch(gyro, accel)
+        return (perf_counter() - began) / (rounds * len(gyro))
+
+    return measure
+
+
+def _new(folder: Path) -> Path:
+    folder.mkdir()
+    return folder
