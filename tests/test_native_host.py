@@ -58,7 +58,7 @@ def in_host(
         archive.extract(library, folder)
     sizes = [sum(s.size for s in signals) for signals in (block.inputs, block.parameters, block.reported)]
     (folder / "record").write_bytes(inputs(sizes[0]).tobytes())
-    arguments = [guid(block, native=True), folder / "record", sizes[0], sizes[0] + sizes[1], sizes[2], H, 0]
+    arguments = ["", guid(block, native=True), folder / "record", sizes[0], sizes[0] + sizes[1], sizes[2], H, 0]
     command = [*runner, host, folder / library, *arguments]
     run = subprocess.run([str(part) for part in command], capture_output=True, text=True, env=environment or {})
     assert run.returncode == 0, run.stderr

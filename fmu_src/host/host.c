@@ -1,8 +1,8 @@
-/* A host without Python: steps a native FMU through a record of inputs; prints its outputs, or how long it takes.
+/* A host without Python: steps an FMU through a record of inputs; prints its outputs, or how long it takes.
 
-   host LIBRARY GUID RECORD INPUTS FIRST_OUTPUT OUTPUTS H ROUNDS [REFERENCE=VALUE]...
+   host LIBRARY RESOURCES GUID RECORD INPUTS FIRST_OUTPUT OUTPUTS H ROUNDS [REFERENCE=VALUE]...
 
-   RECORD is a file of doubles, INPUTS of them per step: the values of the value references from 0 on. OUTPUTS are those
+   RESOURCES is the address of the FMU's folder of that name, for those that have one. RECORD is a file of doubles, INPUTS of them per step: the values of the value references from 0 on. OUTPUTS are those
    from FIRST_OUTPUT on. With ROUNDS = 0 it prints one line per step: the outputs, 17 digits. Otherwise it goes that many
    times through the record and prints the mean time of setting the inputs, fmi2DoStep and getting the outputs, in ns.
    REFERENCE=VALUE sets a Real parameter before. It is linked without the mathematical library, so that an FMU has to
@@ -58,7 +58,7 @@ static void print_message(fmi2ComponentEnvironment environment, fmi2String name,
     fprintf(stderr, "%s %d %s: %s\n", name, status, category, message);
 }
 
-static void start(Fmu *fmu, const char *path, const char *guid, int count, char **settings) {
+static void start(Fmu *fmu, const char *path, const char *resources, const char *guid, int count, char **settings) {
     static const fmi2CallbackFunctions callbacks = {print_message, calloc, free, NULL, NULL};
     void *library = OPEN(path);
     if (!library) stop("cannot load", path);
@@ -66,7 +66,7 @@ static void start(Fmu *fmu, const char *path, const char *guid, int count, char 
     fmu->do_step = (fmi2DoStepTYPE *)find(library, "fmi2DoStep");
     fmu->get_real = (fmi2GetRealTYPE *)find(library, "fmi2GetReal");
     fmi2InstantiateTYPE *instantiate = (fmi2InstantiateTYPE *)find(library, "fmi2Instantiate");
-    fmi2Component c = instantiate("host", fmi2CoSimulation, guid, "", &callbacks, fmi2False, fmi2True);
+    fmi2Component c = instantiate("host", fmi2CoSimulation, guid, resources, &callbacks, fmi2False, fmi2True);
     if (!c) stop("cannot instantiate", path);
     fmu->instance = c;
     for (int i = 0; i < count; i++) {
@@ -124,22 +124,22 @@ static void print_time(Fmu *fmu, const double *record, size_t rows, size_t round
 
 int main(int count, char **arguments) {
     static Fmu fmu;
-    if (count < 9) stop("host LIBRARY GUID RECORD INPUTS FIRST_OUTPUT OUTPUTS H ROUNDS", "[REFERENCE=VALUE]...");
-    fmu.inputs = (size_t)atoi(arguments[4]);
-    fmu.outputs = (size_t)atoi(arguments[6]);
-    fmu.h = strtod(arguments[7], NULL);
+    if (count < 10) stop("host LIBRARY RESOURCES GUID RECORD INPUTS FIRST_OUTPUT OUTPUTS H ROUNDS", "[REFERENCE=VALUE]...");
+    fmu.inputs = (size_t)atoi(arguments[5]);
+    fmu.outputs = (size_t)atoi(arguments[7]);
+    fmu.h = strtod(arguments[8], NULL);
     if (fmu.inputs > MOST || fmu.outputs > MOST) stop("too many inputs or", "outputs");
     for (unsigned i = 0; i < MOST; i++) {
         fmu.inputs_at[i] = i;
-        fmu.outputs_at[i] = (unsigned)atoi(arguments[5]) + i;
+        fmu.outputs_at[i] = (unsigned)atoi(arguments[6]) + i;
     }
-    start(&fmu, arguments[1], arguments[2], count - 9, arguments + 9);
-    size_t rows, rounds = (size_t)atoi(arguments[8]);
-    double *record = read_record(arguments[3], fmu.inputs ? fmu.inputs : 1, &rows);
+    start(&fmu, arguments[1], arguments[2], arguments[3], count - 10, arguments + 10);
+    size_t rows, rounds = (size_t)atoi(arguments[9]);
+    double *record = read_record(arguments[4], fmu.inputs ? fmu.inputs : 1, &rows);
     if (rounds) {
         print_time(&fmu, record, rows, rounds);
     } else {
         print_outputs(&fmu, record, rows);
     }
-    return 0;
+    return fflush(stdout) == 0 ? 0 : 1;
 }

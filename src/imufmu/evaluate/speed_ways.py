@@ -1,13 +1,16 @@
 """Ways to run a block over one record, each with the time that it takes per sample.
 
-A round trip of an FMU is: set the inputs, fmi2DoStep, get the outputs. In a C host that is all that happens. Python
-calls C functions through ctypes, with arrays made beforehand; what that adds shows where the same native FMU runs in
-both. A Python FMU runs through ctypes only: in a C host it would need libpython.
+A round trip of an FMU is: set the inputs, fmi2DoStep, get the outputs. In a C host that is all that happens. A Python
+program calls the same functions through ctypes, with arrays made beforehand; what that adds shows where a native FMU
+runs in both. A Python FMU is dearer in a C host, where PythonFMU enters and leaves the interpreter at every call.
 """
 
 from __future__ import annotations
 
+import os
 import subprocess
+import sys
+import sysconfig
 from collections.abc import Callable, Mapping
 from contextlib import ExitStack
 from ctypes import CDLL, c_double, c_int, c_size_t, c_void_p, cast
@@ -72,11 +75,16 @@ def ways(trip: Trip, folder: Path, stack: ExitStack) -> dict[str, Callable[[], f
     folder: for the files that they need, until the stack closes what they have opened. Raises BuildError without a C
     compiler.
     """
-    library, model = open_fmu(cached_native_fmu(trip.block.name), _new(folder / "native"))
-    found: dict[str, Callable[[], float]] = {
-        NATIVE_IN_C: in_c_host(trip, library, model.guid, folder),
-        "native FMU, ctypes": through_ctypes(trip, cached_native_fmu(trip.block.name), _SAMPLES["ctypes"], stack),
-        "Python FMU, ctypes": through_ctypes(trip, cached_fmu(trip.block.name), _SAMPLES["Python"], stack),
+    host = folder / "host.exe"
+    compile_program(fmu_src_folder() / "host" / "host.c", host)
+    native, python = cached_native_fmu(trip.block.name), cached_fmu(trip.block.name)
+    found: dict[str, Callable[[], float]] = {NATIVE_IN_C: in_c_host(trip, native, _SAMPLES["C"], host)}
+    libpython = _libpython()
+    if libpython:
+        found["Python FMU, C host"] = in_c_host(trip, python, _SAMPLES["Python"], host, libpython)
+    found |= {
+        "native FMU, ctypes": through_ctypes(trip, native, _SAMPLES["ctypes"], stack),
+        "Python FMU, ctypes": through_ctypes(trip, python, _SAMPLES["Python"], stack),
         "in process, Stream": in_stream(trip),
         "in process, run": on_arrays(trip),
     }
@@ -85,22 +93,42 @@ def ways(trip: Trip, folder: Path, stack: ExitStack) -> dict[str, Callable[[], f
     return found
 
 
-def in_c_host(trip: Trip, library: Path, guid: str, folder: Path) -> Callable[[], float]:
-    """The native FMU in fmu_src/host, a process of its own for every measurement."""
-    host, record = folder / "host.exe", folder / "record.bin"
-    if not host.is_file():
-        compile_program(fmu_src_folder() / "host" / "host.c", host)
-    record.write_bytes(trip.rows.tobytes())
-    n, width = trip.rows.shape
-    rounds = max(1, _SAMPLES["C"] // n)
-    numbers = [width, trip.first_output, trip.outputs, repr(trip.period), rounds]
-    command = [host, library, guid, record, *numbers, f"{trip.period_reference}={trip.period!r}"]
+def in_c_host(trip: Trip, fmu: Path, samples: int, host: Path, libpython: Path | None = None) -> Callable[[], float]:
+    """An FMU in the program ``host``, a process of its own for every measurement; a Python FMU needs libpython."""
+    folder = host.with_name(f"{'python' if libpython else 'native'}_fmu")
+    folder.mkdir()
+    library, model = open_fmu(fmu, folder)
+    rows, record = trip.rows, folder / "record"
+    record.write_bytes(rows.tobytes())
+    numbers = [rows.shape[1], trip.first_output, trip.outputs, repr(trip.period), max(1, samples // len(rows))]
+    addresses = [library, (folder / "resources").as_uri(), model.guid, record]
+    command = [str(part) for part in (host, *addresses, *numbers, f"{trip.period_reference}={trip.period!r}")]
+    environment = os.environ | (_python_environment(libpython) if libpython else {})
 
     def measure() -> float:
-        done = subprocess.run([str(part) for part in command], capture_output=True, text=True, check=True)
-        return 1e-9 * float(done.stdout)
+        done = subprocess.run(command, capture_output=True, text=True, env=environment)
+        if not done.stdout:
+            raise SimulationError(f"{fmu} failed in a C host: {done.stderr.strip() or f'exit code {done.returncode}'}")
+        return 1e-9 * float(done.stdout)  # PythonFMU may crash its process after that, when it ends
 
     return measure
+
+
+def _libpython() -> Path | None:
+    """The interpreter at hand as a shared library; None where there is none or no way to load it first."""
+    folder, name = sysconfig.get_config_vars("LIBDIR", "INSTSONAME")
+    library = Path(folder or "", name or "")
+    return library if sys.platform == "linux" and sysconfig.get_config_var("Py_ENABLE_SHARED") else None
+
+
+def _python_environment(libpython: Path) -> dict[str, str]:
+    """Variables that give a C program this interpreter and its packages."""
+    packages = dict.fromkeys((sysconfig.get_path("purelib"), sysconfig.get_path("platlib")))
+    return {
+        "LD_PRELOAD": str(libpython),
+        "PYTHONHOME": sys.base_prefix,
+        "PYTHONPATH": os.pathsep.join(packages),
+    }
 
 
 def through_ctypes(trip: Trip, fmu: Path, samples: int, stack: ExitStack) -> Callable[[], float]:
@@ -189,8 +217,3 @@ def in_vqf(trip: Trip) -> Callable[[], float]:
         return (perf_counter() - began) / (rounds * len(gyro))
 
     return measure
-
-
-def _new(folder: Path) -> Path:
-    folder.mkdir()
-    return folder
