@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 import subprocess
 import sys
@@ -88,12 +89,21 @@ def close(name: str, actual: np.ndarray) -> None:
 PORTABLE = [name for name, block in BLOCKS.items() if isinstance(block, SampledBlock)] + ["pendulum"]
 
 
+@pytest.fixture(scope="module")
+def windows(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
+    """What wine must be told: folders of its own, silence, and nothing of a display."""
+    home = tmp_path_factory.mktemp("wine")
+    return {"PATH": os.environ["PATH"], "HOME": str(home), "WINEPREFIX": str(home / "prefix"), "WINEDEBUG": "-all"}
+
+
 @pytest.mark.skipif(not (ZIG and shutil.which("wine")), reason="needs ziglang and wine")
 @pytest.mark.parametrize("name", PORTABLE)
-def test_the_windows_build_gets_the_same_numbers_under_wine(name: str, tmp_path: Path) -> None:
+def test_the_windows_build_gets_the_same_numbers_under_wine(
+    name: str, windows: Mapping[str, str], tmp_path: Path
+) -> None:
     program = tmp_path / "host.exe"
     compile_program(HOST, program, PLATFORMS["win64"])
-    close(name, in_host(name, ["wine"], program, tmp_path, "win64"))
+    close(name, in_host(name, ["wine"], program, tmp_path, "win64", windows))
 
 
 @pytest.mark.skipif(
