@@ -9,9 +9,12 @@ from typing import Any
 import pytest
 from cosim_stubs import binding, fake_fmu, parameter_set, stub, variable, write_ssd, write_zip
 from fmpy.ssp.ssd import read_ssd
+from lxml import etree
 
 from imufmu.cosim import ArchiveError, DescriptionError, System, locate, pack, simulate
 from imufmu.cosim import system as system_module
+from imufmu.cosim.description import NAMESPACES
+from imufmu.cosim.packing import PARAMETER_SET
 from imufmu.registry import BLOCKS
 
 
@@ -63,11 +66,26 @@ def test_a_packed_system_is_plain_ssp_for_other_readers(ssd: Path) -> None:
         "SystemStructure.ssd",
         "resources/clock.fmu",
         "resources/sampler.fmu",
-        "resources/set.ssv",
     ]
     other = read_ssd(packed, validate=True)
     assert [component.source for component in other.system.elements] == ["resources/clock.fmu", "resources/sampler.fmu"]
-    assert other.system.elements[0].parameterBindings[0].parameterValues[0].parameters[0].value == "10"
+    assert other.system.elements[0].parameterBindings[0].parameterValues[0].parameters[0].value == "10.0"
+
+
+def test_a_packed_system_has_one_parameter_set_for_each_component_that_has_values(tmp_path: Path) -> None:
+    """Those of the component, then those of the system: tools differ in which of several sets they apply."""
+    fake_fmu(tmp_path / "a.fmu", [variable("y", "output"), *(variable(n, "parameter") for n in "pqr")])
+    own = binding({"p": ("Real", 1, None), "q": ("Real", 2, None)}) + binding({"q": ("Real", 3, None)})
+    ssd = write_ssd(
+        tmp_path / "a.ssd", {"a": "a.fmu", "b": "a.fmu"}, bindings={"a": own, "": binding({"a.r": ("Real", 4, None)})}
+    )
+    original, packed = System.read(ssd), System.read(pack(ssd, tmp_path / "a.ssp"))
+    values = [(s.component, s.variable.name, s.value) for s in packed.settings]
+    assert values == [(s.component, s.variable.name, s.value) for s in original.settings]
+    assert values == [("a", "p", 1.0), ("a", "q", 3.0), ("a", "r", 4.0)]
+    root = etree.fromstring(zipfile.ZipFile(tmp_path / "a.ssp").read("SystemStructure.ssd"))
+    (one,) = root.iterfind(".//ssv:ParameterSet", NAMESPACES)
+    assert one.get("name") == PARAMETER_SET
 
 
 def test_fmus_of_the_same_name_are_packed_apart(tmp_path: Path) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import zipfile
 from pathlib import Path
 
 import fmu
@@ -11,7 +10,9 @@ import numpy as np
 import pytest
 from backends import BACKENDS, Backend, InProcess
 
-from imufmu.cosim import locate, pack, simulate
+from imufmu.cosim import System, locate, pack, simulate
+from imufmu.cosim.replay import estimator_fmu
+from imufmu.fmi.model_description import guid
 from imufmu.fmi.native import cached_native_fmu
 from imufmu.instance import instantiate
 from imufmu.locations import models_folder
@@ -72,14 +73,17 @@ def test_a_plant_takes_the_same_solver_steps(h: float, max_step: float, kind: st
 
 
 @pytest.mark.parametrize("system", SYSTEMS)
-def test_a_system_of_native_fmus_gives_the_numbers_of_the_python_fmus(system: str, tmp_path: Path) -> None:
-    python = pack(locate(system), tmp_path / "python.ssp")
-    with zipfile.ZipFile(python) as source, zipfile.ZipFile(tmp_path / "native.ssp", "w") as target:
-        for member in source.namelist():
-            content = source.read(member)
-            if member.endswith(".fmu"):
-                content = cached_native_fmu(Path(member).stem).read_bytes()
-            target.writestr(member, content)
-    expected, actual = (simulate(tmp_path / f"{kind}.ssp", stop_time=1.0) for kind in ("python", "native"))
+def test_a_system_of_native_fmus_gives_the_numbers_of_the_python_fmus(system: str) -> None:
+    expected, actual = (simulate(system, stop_time=1.0, native=native) for native in (False, True))
     assert actual.names == expected.names
     assert all(actual[name].tolist() == expected[name].tolist() for name in expected.names)
+
+
+def test_native_fmus_are_those_of_our_blocks_in_a_system_a_pack_and_a_replay(tmp_path: Path) -> None:
+    systems = [System.read(locate("pendulum_lee2012"), native=True)]
+    systems.append(System.read(pack(locate("pendulum_lee2012"), tmp_path / "a.ssp", native=True)))
+    for system in systems:
+        assert [part.model.guid for part in system.parts] == [
+            guid(BLOCKS[name], native=True) for name in ("pendulum", "imu", "lee2012")
+        ]
+    assert estimator_fmu("lee2012", native=True) == cached_native_fmu("lee2012")

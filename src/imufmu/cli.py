@@ -43,6 +43,7 @@ Sets = Annotated[
     typer.Option("--set", metavar="NAME=VALUE", help="Parameter value; a vector as 1,2,3. Repeatable."),
 ]
 Output = Annotated[Path | None, typer.Option("--output", "-o", help="Write the results to this .csv or .h5 file.")]
+Native = Annotated[bool, typer.Option("--native", help="Our blocks as compiled C instead of Python.")]
 Plot = Annotated[bool, typer.Option("--plot", help="Write a figure next to the working folder's other files.")]
 
 
@@ -150,6 +151,7 @@ def run(
     jacobi: Annotated[
         bool, typer.Option("--jacobi", help="Take all inputs before the step, as simple masters do.")
     ] = False,
+    native: Native = False,
     output: Output = None,
     plot: Plot = False,
     report: Annotated[Path | None, typer.Option("--report", help="Write an HTML report to this file.")] = None,
@@ -176,7 +178,7 @@ def run(
     check_target(output, ".csv", ".h5")
     check_target(report, ".html")
     check_target(animation, ".gif", ".mp4")
-    read = System.read(locate(system))
+    read = System.read(locate(system), native=native)
     check_pictures(read, plot, report, animation)
     with progress_bar(f"running {read.description.name}") as progress:
         result = simulate(
@@ -206,6 +208,7 @@ def replay(
         str, typer.Option("--estimator", "-e", help="Name of an estimator, or an .fmu file.")
     ] = "lee2012",
     sets: Sets = None,
+    native: Native = False,
     output: Output = None,
     local_variables: Annotated[bool, typer.Option("--locals", help="Also write the FMU's local variables.")] = False,
     plot: Plot = False,
@@ -230,7 +233,7 @@ def replay(
     with progress_bar(f"replaying {read_recording.name}") as progress:
         result = replay_recording(
             read_recording,
-            estimator_fmu(estimator),
+            estimator_fmu(estimator, native=native),
             parsed_sets(sets),
             local_variables=local_variables,
             progress=progress,
@@ -247,17 +250,19 @@ def replay(
 def pack(
     system: Annotated[str, typer.Argument(help="Name of a system, or an .ssd file")],
     target: Annotated[Path, typer.Argument(help="The .ssp file to write")],
+    native: Native = False,
 ) -> None:
-    """Write a system, its FMUs and its parameter sets as one .ssp file for other tools.
+    """Write a system, its FMUs and its parameters as one .ssp file for other tools.
 
     \b
       imufmu pack pendulum_lee2012 pendulum.ssp
+      imufmu pack pendulum_lee2012 pendulum.ssp --native      for tools without Python, on this platform
     """
     from .cosim import locate
     from .cosim import pack as pack_system
 
     check_target(target, ".ssp")
-    pack_system(locate(system), target)
+    pack_system(locate(system), target, native=native)
     out.print(str(target))
 
 

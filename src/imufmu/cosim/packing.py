@@ -1,33 +1,48 @@
-"""Pack a system into one .ssp file that any SSP 1.0 tool can load."""
+"""Pack a system into one .ssp file that any SSP 1.0 tool can load.
+
+The values of each component, wherever the description binds them, become one parameter set inside the description, of
+one name: libcosim applies the first set of a component only, and ecos the sets of the name that it is told.
+"""
 
 from __future__ import annotations
 
 import zipfile
+from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 from lxml import etree
 
 from ..files import atomic_write
-from .description import NAMESPACES, Sources, read_xml
+from .description import NAMESPACES, read_xml
+from .interface import representation, unit_of
+from .settings import Setting
 from .system import STRUCTURE, System
+
+PARAMETER_SET = "parameters"  # name of the set of each component
 
 _FIXED_TIME = (1980, 1, 1, 0, 0, 0)  # the earliest a zip can say: equal contents make equal bytes
 
 
 def pack(ssd: str | Path, target: str | Path, *, native: bool = False) -> Path:
-    """Write the system described by ``ssd``, with its FMUs and parameter sets under ``resources/``, to ``target``.
+    """Write the system described by ``ssd`` to ``target``, its FMUs under ``resources/``, its parameters inside.
 
     native: as in System.read. Returns the path written. Raises what System.read raises, and WriteError.
     """
     system = System.read(ssd, native=native)
     root = read_xml(system.description.path, "SystemStructureDescription")
-    files = Sources(system.description.path, None)
     members: dict[str, Path] = {}
+    for bindings in root.findall(".//ssd:ParameterBindings", NAMESPACES):
+        bindings.getparent().remove(bindings)
     for component in root.iterfind("ssd:System/ssd:Elements/ssd:Component", NAMESPACES):
-        fmu = next(part.fmu for part in system.parts if part.name == component.get("name"))
-        component.set("source", _member(fmu, members))
-    for binding in root.iterfind(".//ssd:ParameterBinding[@source]", NAMESPACES):
-        binding.set("source", _member(files(binding), members))
+        name = component.get("name")
+        component.set("source", _member(next(part.fmu for part in system.parts if part.name == name), members))
+        settings = [setting for setting in system.settings if setting.component == name]
+        if settings:
+            # The standard wants it behind these two.
+            before = [component.find(f"ssd:{tag}", NAMESPACES) for tag in ("Connectors", "ElementGeometry")]
+            component.insert(sum(element is not None for element in before), _bindings(settings))
+    etree.indent(root)
     contents = {name: path.read_bytes() for name, path in members.items()}
     contents[STRUCTURE] = etree.tostring(root, xml_declaration=True, encoding="UTF-8")
     with atomic_write(target) as temporary, zipfile.ZipFile(temporary, "w", zipfile.ZIP_DEFLATED) as archive:
@@ -37,6 +52,24 @@ def pack(ssd: str | Path, target: str | Path, *, native: bool = False) -> Path:
             entry.external_attr = 0o644 << 16
             archive.writestr(entry, content)
     return Path(target)
+
+
+def _bindings(settings: Sequence[Setting]) -> Any:
+    """The element ParameterBindings with one set of these values."""
+    ssd, ssv = (f"{{{NAMESPACES[prefix]}}}" for prefix in ("ssd", "ssv"))
+    bindings = etree.Element(f"{ssd}ParameterBindings")
+    values = etree.SubElement(etree.SubElement(bindings, f"{ssd}ParameterBinding"), f"{ssd}ParameterValues")
+    own = {"ssv": NAMESPACES["ssv"]}  # some tools know it by this prefix only
+    group = etree.SubElement(values, f"{ssv}ParameterSet", nsmap=own, version="1.0", name=PARAMETER_SET)
+    parameters = etree.SubElement(group, f"{ssv}Parameters")
+    for setting in settings:
+        kind, unit = representation(setting.variable), unit_of(setting.variable)
+        parameter = etree.SubElement(parameters, f"{ssv}Parameter", name=setting.variable.name)
+        text = str(setting.value).lower() if kind == "Boolean" else str(setting.value)
+        value = etree.SubElement(parameter, f"{ssv}{kind}", value=text)
+        if kind == "Real" and unit:
+            value.set("unit", unit)
+    return bindings
 
 
 def _member(path: Path, members: dict[str, Path]) -> str:

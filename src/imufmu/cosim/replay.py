@@ -12,6 +12,7 @@ import numpy as np
 
 from ..archives import open_fmu
 from ..fmi.build import cached_fmu
+from ..fmi.native import cached_native_fmu
 from ..recordings import Recording, hold_missing
 from ..registry import BLOCKS, ESTIMATORS
 from ..tables import write_csv
@@ -53,10 +54,10 @@ class Replay:
         write_csv(path, {"time": self.recording.time, **self.columns})
 
 
-def estimator_fmu(name: str) -> Path:
-    """The FMU a user means: a file, or an estimator of imufmu by name. Raises ValueError."""
+def estimator_fmu(name: str, *, native: bool = False) -> Path:
+    """The FMU a user means: a file, or an estimator of imufmu by name, in Python or native. Raises ValueError."""
     if name in BLOCKS:
-        return cached_fmu(name)
+        return (cached_native_fmu if native else cached_fmu)(name)
     if Path(name).suffix.lower() == ".fmu":
         return Path(name)
     known = ", ".join(block.name for block in ESTIMATORS)
