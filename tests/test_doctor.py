@@ -9,7 +9,9 @@ from pathlib import Path
 import pytest
 
 from imufmu.fmi.build import cached_fmu
+from imufmu.fmi.compilers import PLATFORMS
 from imufmu.fmi.doctor import Level, examine
+from imufmu.fmi.native import cached_native_fmu
 from imufmu.registry import BLOCKS
 
 
@@ -27,6 +29,8 @@ def changed(tmp_path) -> Callable[..., Path]:
                     content = content.replace(xml[0].encode(), xml[1].encode())
                 if content is not None:
                     target.writestr(name, content)
+            for name in set(members or {}) - set(source.namelist()):
+                target.writestr(name, members[name])
         return path
 
     return make
@@ -43,6 +47,28 @@ def test_our_own_fmus_have_no_problem_and_take_a_step(name):
     assert next(f.text for f in findings if f.topic == "one step").startswith("works on this machine")
     assert any(f.topic == "Python" and "casadi, numpy" in f.text for f in findings)
     assert {"Simulink", "Dymola", "OpenModelica", "OMSimulator", "FMPy"} <= {f.topic for f in findings}
+
+
+def test_a_native_fmu_of_every_platform_has_no_problem_and_each_host_is_told_its_platforms(tmp_path):
+    """No compiler needed: empty binaries stand for those of other platforms."""
+    path = tmp_path / "all.fmu"
+    with zipfile.ZipFile(cached_native_fmu("lee2012")) as source, zipfile.ZipFile(path, "w") as target:
+        binaries = {f"binaries/{p.folder}/lee2012{p.suffix}" for p in PLATFORMS.values()}
+        for name in {*source.namelist(), *binaries}:
+            target.writestr(name, source.read(name) if name in source.namelist() else b"")
+    findings = examine(path)
+    assert [f for f in findings if f.level is Level.PROBLEM] == []
+    assert [f.text.split()[0] for f in findings if f.topic == "binaries"] == sorted(PLATFORMS)
+    texts = {f.topic: f.text for f in findings}
+    assert texts["Dymola"] == "64-bit Linux, 64-bit Windows"
+    assert texts["FMPy"] == "macOS on Apple silicon, Linux on ARM, macOS, 64-bit Linux, 64-bit Windows"
+
+
+def test_a_host_that_runs_on_none_of_the_platforms_inside_is_told(changed):
+    only_arm = {f"binaries/{folder}": None for folder in ("linux64/lee2012.so", "win64/lee2012.dll")}
+    findings = examine(changed(only_arm | {"binaries/aarch64-linux/lee2012.so": b""}))
+    texts = {f.topic: f.text for f in findings}
+    assert texts["Simulink"].startswith("nowhere") and texts["FMPy"] == "Linux on ARM"
 
 
 def test_a_crash_of_the_fmu_is_a_finding(changed):

@@ -17,7 +17,7 @@ from fmpy.validation import validate_fmu
 from ..archives import ArchiveError, fmu_members, read_members
 from .trial import try_step
 
-_SYSTEMS = {"linux": ".so", "win": ".dll", "darwin": ".dylib"}
+_SYSTEMS = {"linux": ".so", "darwin": ".dylib", "win": ".dll"}  # the name darwin has a win in it
 _PLATFORMS = {
     "linux64": "64-bit Linux",
     "win64": "64-bit Windows",
@@ -30,7 +30,15 @@ _PLATFORMS = {
     "aarch64-linux": "Linux on ARM",
     "aarch64-darwin": "macOS on Apple silicon",
 }
-_HOSTS = ("Simulink", "Dymola", "OpenModelica", "OMSimulator", "FMPy")
+# Hosts, and where they run. Only FMPy is known to look into the folders of processors that came with FMI 2.0.4.
+_DESKTOPS = frozenset({"linux64", "win64", "darwin64"})
+_HOSTS = {
+    "Simulink": _DESKTOPS,
+    "Dymola": frozenset({"linux64", "win64"}),
+    "OpenModelica": _DESKTOPS,
+    "OMSimulator": _DESKTOPS,
+    "FMPy": frozenset(_PLATFORMS),
+}
 
 
 class Level(Enum):
@@ -147,9 +155,11 @@ def _python_packages(path: Path) -> Finding:
 
 
 def _hosts(platforms: list[str], model: Any, is_python: bool) -> Iterator[Finding]:
-    systems = sorted({_PLATFORMS.get(platform, platform) for platform in platforms})
-    where = ", ".join(systems) or "nowhere as it is"
-    for host in _HOSTS:
+    for host, its_platforms in _HOSTS.items():
+        where = ", ".join(_PLATFORMS[platform] for platform in platforms if platform in its_platforms)
+        if not where:
+            yield Finding(Level.NOTE, host, "nowhere: no binary for a platform that it runs on")
+            continue
         needs = []
         if host in ("OpenModelica", "OMSimulator") and not str(model.fmiVersion).startswith("2."):
             needs.append("an FMU of version 2.0")
