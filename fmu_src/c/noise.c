@@ -9,13 +9,15 @@ static uint64_t mix(uint64_t z) {
     return z ^ (z >> 31);
 }
 
-/* Draw the noise of sample k: numbers in (0, 1) that are a pure function of seed and k. */
+/* Draw the noise of sample k: numbers in (0, 1) that are a pure function of each stream's seed and k. */
 static void draw(Instance *c, int64_t k) {
-    if (N_NORMALS == 0) return;
-    uint64_t stream = mix((uint64_t)c->state.values[SEED] + STRIDE);
-    for (int j = 0; j < N_NORMALS; j++) {
-        uint64_t index = (uint64_t)k * N_NORMALS + (uint64_t)j;
-        uint64_t z = mix(stream + (index + 1) * STRIDE);
-        c->draws[j] = ((double)(z >> 12) + 0.5) * 0x1p-52; /* 52 bits and a half: never 0, never 1 */
+    double *next = c->draws;
+    for (const Stream *stream = STREAMS; stream->draws > 0; stream++) {
+        uint64_t start = mix((uint64_t)c->state.values[stream->seed] + STRIDE);
+        for (int j = 0; j < stream->draws; j++) {
+            uint64_t index = (uint64_t)k * (uint64_t)stream->draws + (uint64_t)j;
+            uint64_t z = mix(start + (index + 1) * STRIDE);
+            *next++ = ((double)(z >> 12) + 0.5) * 0x1p-52; /* 52 bits and a half: never 0, never 1 */
+        }
     }
 }

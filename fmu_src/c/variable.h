@@ -1,4 +1,4 @@
-/* What block.c says about each variable. The value reference of a variable is its place in the table. */
+/* What block.c says about each variable and each stream of noise. The value reference of a variable is its place in the table. */
 
 typedef enum { REAL, INTEGER, BOOLEAN } Type;
 
@@ -11,3 +11,8 @@ typedef struct {
     Role role;
     double start, minimum, maximum;
 } Variable;
+
+typedef struct {
+    int seed;  /* value reference of the parameter */
+    int draws; /* at a time; 0 behind the last stream */
+} Stream;

@@ -91,6 +91,17 @@ class Block:
         raise DeclarationError(f"{self.name}: a block is a SampledBlock or a ContinuousBlock")
 
     @property
+    def seeds(self) -> tuple[tuple[str, int], ...]:
+        """Its streams of noise: the parameter that holds the seed, and the number of draws at a time."""
+        raise DeclarationError(f"{self.name}: a block is a SampledBlock or a ContinuousBlock")
+
+    @cached_property
+    def seeds_at(self) -> tuple[tuple[int, int], ...]:
+        """``seeds`` by position in the flat parameter vector."""
+        names = [variable.name for variable in self.variables if variable.group == "parameter"]
+        return tuple((names.index(name), width) for name, width in self.seeds)
+
+    @property
     def reported(self) -> tuple[Signal, ...]:
         """Every signal the block reports: outputs, then locals."""
         return (*self.outputs, *self.locals)
@@ -221,6 +232,10 @@ class SampledBlock(Block):
         period = vocabulary.sample_period(self.period)
         return (period, vocabulary.SEED) if self.normals else (period,)
 
+    @property
+    def seeds(self) -> tuple[tuple[str, int], ...]:
+        return _one_stream(self.normals)
+
     @cached_property
     def first_function(self) -> Any:
         """CasADi Function (u, p, w) -> (x, y): the first sample; w are ``normals`` uniform draws."""
@@ -319,6 +334,10 @@ class ContinuousBlock(Block):
         max_step = vocabulary.max_step(self.longest_step)
         return (max_step, vocabulary.SEED) if self.normals else (max_step,)
 
+    @property
+    def seeds(self) -> tuple[tuple[str, int], ...]:
+        return _one_stream(self.normals)
+
     @cached_property
     def initial_function(self) -> Any:
         """CasADi Function (p, w) -> (x); w are ``normals`` uniform draws."""
@@ -371,6 +390,10 @@ class ContinuousBlock(Block):
             self._symbols("u", self.inputs),
             self._symbols("p", self.parameters),
         )
+
+
+def _one_stream(normals: int) -> tuple[tuple[str, int], ...]:
+    return ((vocabulary.SEED.name, normals),) if normals else ()
 
 
 def _shaped(flat: Any, shape: Shape) -> Any:

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from .block import Block, ContinuousBlock, ParameterError, SampledBlock
-from .noise import uniforms
+from .noise import draws
 from .signals import total_size
 
 CLOCK_TOLERANCE = 1e-6  # of a sample: a step that ends this little after an instant does not contain it
@@ -100,13 +100,12 @@ class SampledInstance(Instance):
         self.next_sample = 0
         self._w = np.full(block.normals, 0.5)
         self._draws = np.zeros((0, block.normals))
-        self._draws_from: tuple[float, int] = (-1, 0)  # seed and first sample of the draws at hand
+        self._draws_from: tuple[list[tuple[float, int]], int] = ([], 0)  # streams and first sample of those at hand
         self._x_next = np.zeros_like(self.x)
         self._first = buffered(block.first_function, (self.u, self.p, self._w), (self._x_next, self.y))
         self._next = buffered(block.next_function, (self.x, self.u, self.p, self._w), (self._x_next, self.y))
         names = [v.name for v in block.variables if v.group == "parameter"]
         self._period_at = names.index("sample_period")
-        self._seed_at = names.index("seed") if block.normals else None
 
     @property
     def sample_period(self) -> float:
@@ -147,12 +146,12 @@ class SampledInstance(Instance):
             self.sample()
 
     def _draw(self, k: int) -> None:
-        if self._seed_at is None:
+        if not self.block.normals:
             return
-        seed, first = self.p[self._seed_at], k - k % _DRAWS_AHEAD
-        if self._draws_from != (seed, first):
-            self._draws = uniforms(int(seed), first, _DRAWS_AHEAD, self.block.normals)
-            self._draws_from = (seed, first)
+        streams, first = [(self.p[at], width) for at, width in self.block.seeds_at], k - k % _DRAWS_AHEAD
+        if self._draws_from != (streams, first):
+            self._draws = draws(streams, first, _DRAWS_AHEAD)
+            self._draws_from = (streams, first)
         self._w[:] = self._draws[k - first]
 
     def get_state(self) -> dict[str, Any]:
@@ -180,7 +179,6 @@ class ContinuousInstance(Instance):
         self._output = buffered(block.output_function, (self.x, self.u, self.p, self._t), (self.y,))
         names = [v.name for v in block.variables if v.group == "parameter"]
         self._max_step_at = names.index("max_step")
-        self._seed_at = names.index("seed") if block.normals else None
 
     @property
     def time(self) -> float:
@@ -189,8 +187,7 @@ class ContinuousInstance(Instance):
     def initialise(self, start_time: float) -> None:
         super().initialise(start_time)
         self._t[0] = start_time
-        if self._seed_at is not None:
-            self._w[:] = uniforms(int(self.p[self._seed_at]), 0, 1, self.block.normals)[0]
+        self._w[:] = draws([(self.p[at], width) for at, width in self.block.seeds_at], 0, 1)[0]
         self._initial()
         self.refresh()
 

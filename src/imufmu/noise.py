@@ -7,6 +7,7 @@ expression that becomes part of the block's step, so there is one copy of it.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import casadi as ca
@@ -33,6 +34,12 @@ def uniforms(seed: int, first: int, count: int, width: int) -> np.ndarray:
         z = _mix(stream + (index + np.uint64(1)) * _STRIDE)
     # 52 bits and a half: exact in a double, so neither 0 nor 1 is ever reached.
     return ((z >> np.uint64(12)).astype(float) + 0.5).reshape(count, width) * 2.0**-52
+
+
+def draws(streams: Sequence[tuple[float, int]], first: int, count: int) -> np.ndarray:
+    """Uniform draws of independent streams side by side, (count, sum of widths); streams: seed and width of each."""
+    parts = [uniforms(int(seed), first, count, width) for seed, width in streams]
+    return np.hstack(parts) if parts else np.zeros((count, 0))
 
 
 # Rational approximations of the normal quantile, M. J. Wichura, Algorithm AS 241 (PPND16), Applied Statistics 37(3),

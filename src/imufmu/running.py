@@ -11,7 +11,7 @@ import numpy as np
 
 from .block import Block, ContinuousBlock, SampledBlock
 from .instance import SampledInstance, StepError, diverged, solver_steps
-from .noise import uniforms
+from .noise import draws
 from .signals import Signal, State, total_size
 
 _CHUNK = 1024  # steps evaluated by one call into CasADi
@@ -44,23 +44,23 @@ def run(
     """
     u = _input_rows(block, inputs)
     p = block.parameter_vector(parameters)
-    seed = _seed(block, p)
+    streams = _streams(block, p)
     n = len(u)
 
-    def draws(first: int, count: int) -> np.ndarray:
-        return uniforms(seed, first, count, block.normals).T
+    def columns(first: int, count: int) -> np.ndarray:
+        return draws(streams, first, count).T
 
-    x, y0 = (np.array(part).ravel() for part in block.first_function(u[0], p, draws(0, 1)))
+    x, y0 = (np.array(part).ravel() for part in block.first_function(u[0], p, columns(0, 1)))
     if initial_state:
         _replace(x, block.held_state, initial_state)
         own = total_size(block.state)
-        y0 = np.array(block.output_function(x[:own], u[0], p, draws(0, 1))).ravel()
+        y0 = np.array(block.output_function(x[:own], u[0], p, columns(0, 1))).ravel()
     y = np.empty((n, len(y0)))
     y[0] = y0
     chunk, p_columns = _chunk(block.next_function), np.tile(p[:, None], _CHUNK)
     for first in range(1, n, _CHUNK):
         count = min(_CHUNK, n - first)
-        states, rows = chunk(x, _padded(u[first : first + count]), p_columns, draws(first, _CHUNK))
+        states, rows = chunk(x, _padded(u[first : first + count]), p_columns, columns(first, _CHUNK))
         x = np.array(states[:, count - 1]).ravel()
         y[first : first + count] = np.array(rows).T[:count]
     period = p[_names(block).index("sample_period")]
@@ -89,7 +89,7 @@ def simulate(
     per_row = solver_steps(step, p[_names(block).index("max_step")])
     time = start_time + np.arange(n + 1) * step
     states = np.empty((n + 1, total_size(block.held_state)))
-    states[0] = np.array(block.initial_function(p, uniforms(_seed(block, p), 0, 1, block.normals)[0])).ravel()
+    states[0] = np.array(block.initial_function(p, draws(_streams(block, p), 0, 1)[0])).ravel()
     h = step / per_row
     t = (time[:-1, None] + np.arange(per_row) * h).reshape(-1, 1)
     u_held = np.repeat(u[:-1], per_row, axis=0)
@@ -161,8 +161,8 @@ def _padded(rows: np.ndarray) -> np.ndarray:
     return np.pad(rows, ((0, _CHUNK - len(rows)), (0, 0)), mode="edge").T
 
 
-def _seed(block: SampledBlock | ContinuousBlock, p: np.ndarray) -> int:
-    return int(p[_names(block).index("seed")]) if block.normals else 0
+def _streams(block: Block, p: np.ndarray) -> list[tuple[float, int]]:
+    return [(p[at], width) for at, width in block.seeds_at]
 
 
 def _names(block: Block) -> list[str]:

@@ -2,7 +2,8 @@
 
 Each block's outputs feed the inputs of the same name of the blocks behind it, within one sample and without delay:
 the numbers are those of the co-simulated chain. All sampled blocks share ``sample_period``. Other parameters and the
-signals in between are named ``block.name``; the outputs are those of the last block.
+signals in between are named ``block.name``; the outputs are those of the last block. Where one block draws noise its
+seed is ``seed``; where several do, each keeps its own as ``block.seed``.
 
 A plant may stand first. It advances from sample to sample with its inputs held, in a fixed number of solver steps, and
 its time counts from the first sample.
@@ -26,9 +27,8 @@ from .signals import DeclarationError, Parameter, Signal, State, total_size
 def series(*blocks: Block) -> Series:
     """The blocks as one, signals flowing from left to right.
 
-    Raises DeclarationError if they do not fit: fewer than two, a plant that is not the first, nothing to pass on,
-    inputs of one name and different units, or more than one block that draws noise (one seed could not give both the
-    numbers they have alone).
+    Raises DeclarationError if they do not fit: fewer than two, a plant that is not the first, nothing to pass on, or
+    inputs of one name and different units.
     """
     name = "_".join(block.name for block in blocks)
     _check(blocks)
@@ -64,7 +64,7 @@ def series(*blocks: Block) -> Series:
         initial=_nothing,
         step=_nothing,
         period=sampled[-1].period,
-        normals=sum(block.normals for block in blocks if isinstance(block, SampledBlock | ContinuousBlock)),
+        normals=sum(width for block in blocks for _, width in block.seeds),
         blocks=tuple(blocks),
     )
 
@@ -84,9 +84,6 @@ def _check(blocks: Sequence[Block]) -> None:
         faults.append("a plant can only stand first")
     if not any(isinstance(block, SampledBlock) for block in blocks):
         faults.append("has no sampled block")
-    drawing = [block.name for block in blocks if isinstance(block, SampledBlock | ContinuousBlock) and block.normals]
-    if len(drawing) > 1:
-        faults.append(f"{' and '.join(drawing)} both draw noise, and one seed cannot serve both")
     for i, block in enumerate(blocks[1:], 1):
         offered = {s.name: s for before in blocks[:i] for s in before.outputs}
         fed = [s for s in block.inputs if s.name in offered]
@@ -121,7 +118,12 @@ class Series(SampledBlock):
         plant = self.blocks[0]
         if isinstance(plant, ContinuousBlock):  # the solver's step must not grow beyond what the plant allows
             period = replace(period, maximum=self._solver_steps * plant.longest_step)
-        return (period, vocabulary.SEED) if self.normals else (period,)
+        return (period, *(replace(vocabulary.SEED, name=name) for name, _ in self.seeds))
+
+    @property
+    def seeds(self) -> tuple[tuple[str, int], ...]:
+        own = [(block.name, name, width) for block in self.blocks for name, width in block.seeds]
+        return tuple((name if len(own) == 1 else f"{block}.{name}", width) for block, name, width in own)
 
     @property
     def _solver_steps(self) -> int:
@@ -195,19 +197,18 @@ class Series(SampledBlock):
         fixed = {"max_step": 1.0}  # not read: the number of solver steps is that of the series
         values = []
         for parameter in block.parameters:
-            if parameter.name in ("sample_period", "seed"):
-                values.append(places[parameter.name])
-            else:
-                values.append(fixed.get(parameter.name) or places[f"{block.name}.{parameter.name}"])
+            own = f"{block.name}.{parameter.name}"
+            values.append(fixed.get(parameter.name) or places[own if own in places else parameter.name])
         return ca.vertcat(*values)
 
     def _inputs_of(self, block: Block, u: Any) -> Any:
         known = dict(zip((s.name for s in self.inputs), _split(u, self.inputs), strict=True))
         return ca.vertcat(*(known[s.name] for s in block.inputs))
 
-    def _draws(self, block: SampledBlock | ContinuousBlock, w: Any) -> Any:
-        """The draws are those of the one block that has any."""
-        return w if block.normals else ca.MX(0, 1)
+    def _draws(self, block: Block, w: Any) -> Any:
+        """Those of the draws that belong to a block."""
+        widths = [sum(width for _, width in other.seeds) for other in self.blocks]
+        return ca.vertsplit(w, [0, *_ends(widths)])[self.blocks.index(block)]
 
     def _advanced(self, plant: ContinuousBlock, x: Any, u: Any, p: Any, t: Any, period: Any) -> Any:
         """The plant's state one sample period after t (s)."""

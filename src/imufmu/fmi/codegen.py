@@ -64,20 +64,21 @@ def _table(block: Block, functions: dict[str, Any]) -> str:
     environment = Environment(
         loader=PackageLoader("imufmu.fmi"), undefined=StrictUndefined, trim_blocks=True, keep_trailing_newline=True
     )
+    references = {variable.name: reference for reference, variable in value_references(block)}
     return environment.get_template("block.c").render(
         block=block,
         version=__version__,
         guid=guid(block, native=True),
-        constants=_constants(block, functions),
+        constants=_constants(block, functions, references),
+        streams=[(references[name], width) for name, width in block.seeds],
         aliases={alias: function.name() for alias, function in functions.items()},
         variables=[_row(variable) for _, variable in sorted(value_references(block), key=lambda listed: listed[0])],
         c_string=json.dumps,  # the names and units are plain ASCII, which both languages quote alike
     )
 
 
-def _constants(block: Block, functions: dict[str, Any]) -> dict[str, Any]:
+def _constants(block: Block, functions: dict[str, Any], references: dict[str, int]) -> dict[str, Any]:
     """Sizes, places and limits; a place is a value reference."""
-    references = {variable.name: reference for reference, variable in value_references(block)}
     sampled, needs = isinstance(block, SampledBlock), list(functions.values())
     assert isinstance(block, SampledBlock | ContinuousBlock)
     return {
@@ -94,7 +95,6 @@ def _constants(block: Block, functions: dict[str, Any]) -> dict[str, Any]:
         "N_WORK": max(function.sz_w() for function in needs),
         "N_INTEGER_WORK": max(function.sz_iw() for function in needs),
         "PERIOD": references["sample_period" if sampled else "max_step"],
-        "SEED": references.get("seed", 0),  # read only where N_NORMALS > 0
         "SAMPLE_TIME": references.get("sample_time", len(references)),  # a continuous block has none
         "CLOCK_TOLERANCE": repr(CLOCK_TOLERANCE),
         "LONGEST_STEP": repr(float(LONGEST_STEP)),

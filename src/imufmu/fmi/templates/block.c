@@ -16,3 +16,10 @@ static const Variable VARIABLES[N_VARIABLES] = {
     { {{- c_string(v.name) }}, {{ c_string(v.unit) }}, {{ v.type }}, {{ v.role }}, {{ v.start }}, {{ v.minimum }}, {{ v.maximum -}} },
 {% endfor %}
 };
+
+static const Stream STREAMS[] = {
+{% for seed, draws in streams %}
+    { {{- seed }}, {{ draws -}} },
+{% endfor %}
+    {0, 0},
+};
