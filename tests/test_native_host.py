@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import html
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -10,10 +12,11 @@ import zipfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+import fmpy.build
 import numpy as np
 import pytest
 
-from imufmu.block import SampledBlock
+from imufmu.block import Block, SampledBlock
 from imufmu.fmi.compilers import PLATFORMS, compile_program, has_ziglang, own_platform
 from imufmu.fmi.model_description import guid
 from imufmu.fmi.native import block_called, build_native
@@ -57,11 +60,18 @@ def in_host(
     library = f"binaries/{platform}/{block.name}{PLATFORMS[platform].suffix}"
     with zipfile.ZipFile(fmu) as archive:
         archive.extract(library, folder)
+    return printed(block, [*runner, str(host)], folder / library, environment or {})
+
+
+def printed(block: Block, host: Sequence[str], library: Path, environment: Mapping[str, str]) -> np.ndarray:
+    """What the host prints of a library."""
     sizes = [sum(s.size for s in signals) for signals in (block.inputs, block.parameters, block.reported)]
-    (folder / "record").write_bytes(inputs(sizes[0]).tobytes())
-    arguments = ["", guid(block, native=True), folder / "record", sizes[0], sizes[0] + sizes[1], sizes[2], H, 0]
-    command = [*runner, host, folder / library, *arguments]
-    run = subprocess.run([str(part) for part in command], capture_output=True, text=True, env=environment or {})
+    record = library.with_name("record")
+    record.write_bytes(inputs(sizes[0]).tobytes())
+    arguments = ["", guid(block, native=True), record, sizes[0], sizes[0] + sizes[1], sizes[2], H, 0]
+    run = subprocess.run(
+        [*host, str(library), *map(str, arguments)], capture_output=True, text=True, env=dict(environment)
+    )
     assert run.returncode == 0, run.stderr
     return np.array([[float(value) for value in line.split()] for line in run.stdout.splitlines()])
 
@@ -78,6 +88,23 @@ def host(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_a_c_program_gets_the_numbers_of_the_run_in_process(name: str, host: Path, tmp_path: Path) -> None:
     """Bit for bit: the same operations in the same order, the same C library."""
     assert np.array_equal(in_host(name, [], host, tmp_path, own_platform()), in_process(name))
+
+
+@pytest.mark.skipif(sys.platform != "linux" or not shutil.which("cmake"), reason="needs Linux, and CMake for FMPy")
+def test_what_fmpy_compiles_as_documented_runs_in_a_host_without_the_mathematical_library(
+    host: Path, tmp_path: Path
+) -> None:
+    """FMPy does not link it by itself; the page of documentation inside the FMU tells how it does."""
+    with zipfile.ZipFile(build_native("lee2012", tmp_path)) as archive:
+        archive.extractall(tmp_path)
+    shutil.rmtree(tmp_path / "binaries")
+    page = html.unescape((tmp_path / "documentation" / "index.html").read_text(encoding="utf-8"))
+    (given,) = re.findall(r"--cmake-options ([^<]+)<", page)
+    options = dict(option.split("=", 1) for option in given.split())
+    fmpy.build.build_platform_binary(tmp_path, cmake_options=options)
+    (library,) = (tmp_path / "binaries").rglob("lee2012.so")
+    # GCC for that one, ziglang for ours: the same operations, compiled by another compiler.
+    assert np.array_equal(printed(block_called("lee2012"), [str(host)], library, {}), in_process("lee2012"))
 
 
 def close(name: str, actual: np.ndarray) -> None:
