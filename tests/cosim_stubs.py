@@ -7,15 +7,19 @@ import shutil
 import sys
 import tempfile
 import zipfile
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from functools import cache
 from pathlib import Path
 from typing import Any
 
-import fmpy
+import fmpy.fmi1
+import pytest
 from pythonfmu.builder import FmuBuilder
 
 from imufmu.cosim.description import NAMESPACES
+from imufmu.cosim.slave import Slave
+
+Call = tuple[str, str, tuple[Any, ...]]
 
 _HEAD = """
 import math
@@ -285,3 +289,24 @@ def write_ssd(
     ]
     path.write_text("\n".join(lines))
     return path
+
+
+def recorded_calls(monkeypatch: pytest.MonkeyPatch) -> list[Call]:
+    """(instance, function, arguments) of every FMI call from now on, through FMPy's methods or of the C function."""
+    made: list[Call] = []
+    through_fmpy, plain = fmpy.fmi1._FMU._call, Slave._function
+
+    def call(self: Any, name: str, *args: Any) -> Any:
+        made.append((self.instanceName, name, args))
+        return through_fmpy(self, name, *args)
+
+    def function(self: Slave, name: str) -> Callable[..., int]:
+        def called(*args: Any) -> int:
+            made.append((self.name, name, args))
+            return plain(self, name)(*args)
+
+        return called
+
+    monkeypatch.setattr(fmpy.fmi1._FMU, "_call", call)
+    monkeypatch.setattr(Slave, "_function", function)
+    return made

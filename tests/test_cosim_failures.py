@@ -15,24 +15,15 @@ from typing import Any
 
 import fmpy.fmi1
 import pytest
-from cosim_stubs import LIBRARY, fake_fmu, model_description, stub, variable, write_ssd, write_zip
+from cosim_stubs import LIBRARY, Call, fake_fmu, model_description, recorded_calls, stub, variable, write_ssd, write_zip
 
 from imufmu.cosim import DescriptionError, SimulationError, System, master, pack, simulate
 from imufmu.cosim.messages import Messages, _listening, _receive
 
 
 @pytest.fixture
-def calls(monkeypatch: pytest.MonkeyPatch) -> list[tuple[str, str]]:
-    """(instance, function) of every FMI call."""
-    made: list[tuple[str, str]] = []
-    call = fmpy.fmi1._FMU._call
-
-    def recorded(self: Any, name: str, *args: Any) -> Any:
-        made.append((self.instanceName, name))
-        return call(self, name, *args)
-
-    monkeypatch.setattr(fmpy.fmi1._FMU, "_call", recorded)
-    return made
+def calls(monkeypatch: pytest.MonkeyPatch) -> list[Call]:
+    return recorded_calls(monkeypatch)
 
 
 @pytest.fixture(autouse=True)
@@ -57,10 +48,14 @@ def system(folder: Path) -> Path:
     return write_ssd(folder / "system.ssd", parts, ["clock.y -> sampler.u"])
 
 
-def ends(calls: list[tuple[str, str]], instance: str) -> list[str]:
+def of(calls: list[Call], instance: str) -> list[str]:
+    """What was called on an instance."""
+    return [function for name, function, _ in calls if name == instance]
+
+
+def ends(calls: list[Call], instance: str) -> list[str]:
     """What was called on an instance from its failing call on."""
-    own = [function for name, function in calls if name == instance]
-    return own[-3:]
+    return of(calls, instance)[-3:]
 
 
 @pytest.mark.parametrize(
@@ -86,14 +81,14 @@ def ends(calls: list[tuple[str, str]], instance: str) -> list[str]:
     ids=["exit of initialisation", "discard", "fatal", "not finite"],
 )
 def test_a_failure_is_told_and_every_instance_is_left_as_fmi_demands(
-    tmp_path: Path, calls: list[tuple[str, str]], fault: int, message: str, last: list[str]
+    tmp_path: Path, calls: list[Call], fault: int, message: str, last: list[str]
 ) -> None:
     with pytest.raises(SimulationError, match=message):
         simulate(system(tmp_path), parameters={"faulty.fault": fault})
     assert ends(calls, "faulty") == last  # after fatal: no call at all
     for healthy in ("clock", "sampler"):
         assert ends(calls, healthy)[-1] == "fmi2FreeInstance"
-        assert calls.count((healthy, "fmi2FreeInstance")) == 1
+        assert of(calls, healthy).count("fmi2FreeInstance") == 1
 
 
 def test_warnings_reach_the_notes_once(tmp_path: Path) -> None:
@@ -101,13 +96,13 @@ def test_warnings_reach_the_notes_once(tmp_path: Path) -> None:
     assert notes.count("faulty: oil is low") == 1
 
 
-def test_an_fmu_that_cannot_be_instantiated_is_named(tmp_path: Path, calls: list[tuple[str, str]]) -> None:
+def test_an_fmu_that_cannot_be_instantiated_is_named(tmp_path: Path, calls: list[Call]) -> None:
     parts = {"clock": stub("clock"), "born": stub("stillborn")}
     with pytest.raises(SimulationError, match=r"^born: cannot be instantiated"):
         simulate(write_ssd(tmp_path / "system.ssd", parts))
-    assert ("clock", "fmi2FreeInstance") in calls
-    assert ("clock", "fmi2Terminate") not in calls  # it was never initialised
-    assert ("born", "fmi2FreeInstance") not in calls
+    assert "fmi2FreeInstance" in of(calls, "clock")
+    assert "fmi2Terminate" not in of(calls, "clock")  # it was never initialised
+    assert "fmi2FreeInstance" not in of(calls, "born")
 
 
 def test_a_binary_that_cannot_be_loaded_is_named(tmp_path: Path) -> None:
@@ -134,12 +129,12 @@ def test_an_fmu_that_vanished_since_it_was_read_is_named(tmp_path: Path) -> None
 
 
 def test_ctrl_c_ends_the_run_and_frees_every_instance(
-    tmp_path: Path, calls: list[tuple[str, str]], monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, calls: list[Call], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(master, "_BETWEEN_PROGRESS", -1.0)
     with pytest.raises(KeyboardInterrupt):
         simulate(system(tmp_path), progress=lambda *_: signal.raise_signal(signal.SIGINT))
-    assert calls.count(("clock", "fmi2DoStep")) == 2  # the step that was under way, and the next one at most
+    assert of(calls, "clock").count("fmi2DoStep") == 2  # the step that was under way, and the next one at most
     for name in ("clock", "faulty", "sampler"):
         assert ends(calls, name)[-2:] == ["fmi2Terminate", "fmi2FreeInstance"]
 
@@ -168,13 +163,13 @@ def test_a_second_ctrl_c_interrupts_at_once(tmp_path: Path, monkeypatch: pytest.
     assert reached == []
 
 
-def test_an_exception_of_the_caller_frees_every_instance(tmp_path: Path, calls: list[tuple[str, str]]) -> None:
+def test_an_exception_of_the_caller_frees_every_instance(tmp_path: Path, calls: list[Call]) -> None:
     def fail(*_: int) -> None:
         raise RuntimeError("mine")
 
     with pytest.raises(RuntimeError, match="mine"):
         simulate(system(tmp_path), progress=fail)
-    assert sum(function == "fmi2FreeInstance" for _, function in calls) == 3
+    assert sum(function == "fmi2FreeInstance" for _, function, _ in calls) == 3
 
 
 def test_a_run_outside_the_main_thread_works(tmp_path: Path) -> None:

@@ -9,7 +9,7 @@ from typing import Any
 import fmpy
 import numpy as np
 import pytest
-from cosim_stubs import binding, stub, write_ssd
+from cosim_stubs import Call, binding, recorded_calls, stub, write_ssd
 
 from imufmu.cosim import WiringError, master, simulate
 
@@ -17,21 +17,9 @@ H = 0.25  # s, a power of two: every time below is exact
 TIMES = np.arange(5) * H
 
 
-Call = tuple[str, str, tuple[Any, ...]]
-
-
 @pytest.fixture
 def calls(monkeypatch: pytest.MonkeyPatch) -> list[Call]:
-    """(instance, function, arguments) of every FMI call."""
-    made: list[Call] = []
-    call = fmpy.fmi1._FMU._call
-
-    def recorded(self: Any, name: str, *args: Any) -> Any:
-        made.append((self.instanceName, name, args))
-        return call(self, name, *args)
-
-    monkeypatch.setattr(fmpy.fmi1._FMU, "_call", recorded)
-    return made
+    return recorded_calls(monkeypatch)
 
 
 def chain(folder: Path, *connections: str, **options: Any) -> Path:

@@ -76,7 +76,7 @@ class Exchange:
     def record(self, row: int) -> None:
         """Copy the present values into a row."""
         for kind, table in self._tables.items():
-            np.take(self.values[kind], self._sources[kind], out=table[row], mode="clip")
+            self.values[kind].take(self._sources[kind], out=table[row], mode="clip")
 
     def columns(self) -> dict[str, np.ndarray]:
         """Recorded variables by ``component.variable``."""
