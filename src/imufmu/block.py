@@ -67,9 +67,12 @@ class Variable:
     start: float
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Block:
-    """Common part of both kinds of block. ``doc`` is the text for its users, ``reference`` the paper."""
+    """Common part of both kinds of block. ``doc`` is the text for its users, ``reference`` the paper.
+
+    normals: standard normal draws per sample, or at the start of a continuous block.
+    """
 
     name: str
     summary: str
@@ -81,6 +84,7 @@ class Block:
     own_parameters: tuple[Parameter, ...]
     state: tuple[State, ...]
     output: Callable[..., Expressions]
+    normals: int = 0
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
@@ -93,7 +97,7 @@ class Block:
     @property
     def seeds(self) -> tuple[tuple[str, int], ...]:
         """Its streams of noise: the parameter that holds the seed, and the number of draws at a time."""
-        raise DeclarationError(f"{self.name}: a block is a SampledBlock or a ContinuousBlock")
+        return ((vocabulary.SEED.name, self.normals),) if self.normals else ()
 
     @cached_property
     def seeds_at(self) -> tuple[tuple[int, int], ...]:
@@ -220,7 +224,6 @@ class SampledBlock(Block):
     initial: Callable[..., Expressions]
     step: Callable[..., Expressions]
     period: float = 0.01
-    normals: int = 0  # standard normal draws per sample
     slow_due: Callable[..., Any] | None = None
     slow_step: Callable[..., Expressions] | None = None
 
@@ -231,10 +234,6 @@ class SampledBlock(Block):
     def _framework_parameters(self) -> tuple[Parameter, ...]:
         period = vocabulary.sample_period(self.period)
         return (period, vocabulary.SEED) if self.normals else (period,)
-
-    @property
-    def seeds(self) -> tuple[tuple[str, int], ...]:
-        return _one_stream(self.normals)
 
     @cached_property
     def first_function(self) -> Any:
@@ -328,15 +327,10 @@ class ContinuousBlock(Block):
     initial: Callable[..., Expressions]
     dynamics: Callable[..., Expressions]
     longest_step: float = 1e-3
-    normals: int = 0  # standard normal draws at the start
 
     def _framework_parameters(self) -> tuple[Parameter, ...]:
         max_step = vocabulary.max_step(self.longest_step)
         return (max_step, vocabulary.SEED) if self.normals else (max_step,)
-
-    @property
-    def seeds(self) -> tuple[tuple[str, int], ...]:
-        return _one_stream(self.normals)
 
     @cached_property
     def initial_function(self) -> Any:
@@ -390,10 +384,6 @@ class ContinuousBlock(Block):
             self._symbols("u", self.inputs),
             self._symbols("p", self.parameters),
         )
-
-
-def _one_stream(normals: int) -> tuple[tuple[str, int], ...]:
-    return ((vocabulary.SEED.name, normals),) if normals else ()
 
 
 def _shaped(flat: Any, shape: Shape) -> Any:
