@@ -178,6 +178,30 @@ def test_a_universal_library_holds_each_library_where_its_table_says() -> None:
         assert file[start : start + size] == library
 
 
+X86_64, ARM64 = 0x01000007, 0x0100000C  # processors of Mach-O
+
+
+def processors(content: bytes) -> dict[int, bytes]:
+    """Mach-O libraries by processor, of a universal file or of one library."""
+    if content.startswith(b"\xcf\xfa\xed\xfe"):
+        return {struct.unpack_from("<I", content, 4)[0]: content}
+    parts = [struct.unpack_from(">IIII", content, 8 + 20 * i) for i in range(struct.unpack_from(">I", content, 4)[0])]
+    return {processor: content[start : start + size] for processor, _, start, size in parts}
+
+
+def oldest_macos(library: bytes) -> tuple[int, int]:
+    """Version in the load command LC_BUILD_VERSION or LC_VERSION_MIN_MACOSX."""
+    (count,) = struct.unpack_from("<I", library, 16)
+    at = 32
+    for _ in range(count):
+        command, size = struct.unpack_from("<II", library, at)
+        if command in (0x32, 0x24):
+            (version,) = struct.unpack_from("<I", library, at + (12 if command == 0x32 else 8))
+            return version >> 16, version >> 8 & 0xFF
+        at += size
+    raise AssertionError("the library names no version")
+
+
 @NEEDS_ZIG
 def test_ziglang_builds_every_platform_with_all_functions_and_no_build_paths(tmp_path: Path) -> None:
     fmu_path = build_native("lee2012", tmp_path, list(PLATFORMS))
@@ -194,6 +218,9 @@ def test_ziglang_builds_every_platform_with_all_functions_and_no_build_paths(tmp
             assert struct.unpack_from("<H", content, 18)[0] == machine[folder]
         if folder.endswith("darwin64") or folder == "aarch64-darwin":
             assert b"@rpath/lee2012.dylib" in content
+            oldest = {X86_64: (10, 13), ARM64: (11, 0)}
+            found = {processor: oldest_macos(library) for processor, library in processors(content).items()}
+            assert found == (oldest if folder == "darwin64" else {ARM64: oldest[ARM64]})
         assert all(f"fmi2{function}".encode() in content for function in FMI_FUNCTIONS)
         assert str(Path.home()).encode() not in content and b"imufmu_build_" not in content
     assert fmpy.validation.validate_fmu(str(fmu_path)) == []

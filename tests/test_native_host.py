@@ -123,8 +123,12 @@ def windows(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
     return {"PATH": os.environ["PATH"], "HOME": str(home), "WINEPREFIX": str(home / "prefix"), "WINEDEBUG": "-all"}
 
 
+# Noise, a slow step, a plant; the others take a compilation each.
+BRIEFLY = ("imu", "plumb", "pendulum")
+
+
 @pytest.mark.skipif(not (ZIG and shutil.which("wine")), reason="needs ziglang and wine")
-@pytest.mark.parametrize("name", PORTABLE)
+@pytest.mark.parametrize("name", [pytest.param(n, marks=() if n in BRIEFLY else pytest.mark.slow) for n in PORTABLE])
 def test_the_windows_build_gets_the_same_numbers_under_wine(
     name: str, windows: Mapping[str, str], tmp_path: Path
 ) -> None:
