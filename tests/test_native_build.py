@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 import struct
 import subprocess
@@ -105,6 +106,24 @@ def test_the_wrapper_compiles_without_a_warning(name: str, tmp_path: Path) -> No
     warnings = [line for line in said.stderr.splitlines() if ": warning: " in line or ": error: " in line]
     # CasADi writes functions and arguments that are not always used; that text is not ours.
     assert [line for line in warnings if not line.startswith("equations.c:")] == []
+
+
+@pytest.mark.skipif(sys.platform != "linux" or not shutil.which("cc"), reason="reads symbols with objdump")
+@pytest.mark.parametrize("name", ["lee2012", "plumb", "handheld"])
+def test_all_globals_are_constants_and_memory_is_asked_for_with_instances_and_states_only(
+    name: str, tmp_path: Path
+) -> None:
+    """Unoptimised, so that each function calls what its text says."""
+    for file, content in sources(BLOCKS[name]).items():
+        (tmp_path / file).write_bytes(content)
+    subprocess.run(["cc", "-std=c99", "-O0", "-fPIC", "-c", "fmu.c"], cwd=tmp_path, check=True)
+    table = subprocess.run(["objdump", "-t", "fmu.o"], cwd=tmp_path, capture_output=True, text=True, check=True).stdout
+    data = {line.split()[-3] for line in table.splitlines() if " O " in line}
+    assert data and all(section.startswith((".rodata", ".data.rel.ro")) for section in data), data
+    code = subprocess.run(["objdump", "-dr", "fmu.o"], cwd=tmp_path, capture_output=True, text=True, check=True).stdout
+    functions = {part.split(">:")[0].split("<")[-1]: part for part in code.split("\n\n") if ">:" in part}
+    allocating = {name for name, text in functions.items() if re.search(r"\b(malloc|calloc|realloc)\b", text)}
+    assert allocating == {"fmi2Instantiate", "fmi2GetFMUstate", "fmi2DeSerializeFMUstate"}
 
 
 @pytest.mark.skipif(sys.platform != "linux" or not shutil.which("nm"), reason="reads symbols with nm")
