@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 
 from imufmu.fmi import compilers, native
-from imufmu.fmi.build import BuildError
+from imufmu.fmi.build import BuildError, build_fmu
 from imufmu.fmi.codegen import generate
 from imufmu.fmi.compilers import PLATFORMS, own_platform, universal
 from imufmu.fmi.model_description import guid
@@ -177,6 +177,8 @@ def test_without_a_compiler_the_message_says_what_to_install(tmp_path: Path, mon
 def test_unknown_or_unfit_blocks_platforms_and_closed_folders_are_refused_by_name(tmp_path: Path) -> None:
     with pytest.raises(BuildError, match=r"'lee2013'.*lee2012"):
         build_native("lee2013", tmp_path)
+    with pytest.raises(BuildError, match=r"imu\+lee2012: .* build it with --native"):
+        build_fmu("imu+lee2012", tmp_path)
     with pytest.raises(BuildError, match=r"lee2012\+pendulum: a plant can only stand first"):
         build_native("lee2012+pendulum", tmp_path)
     with pytest.raises(BuildError, match=r"'amiga'.*linux64, win64, darwin64"):

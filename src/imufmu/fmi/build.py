@@ -34,6 +34,8 @@ def build_fmu(name: str, folder: Path) -> Path:
 
     Raises BuildError for an unknown name or a folder that cannot be written.
     """
+    if "+" in name:
+        raise BuildError(f"{name}: blocks in series make a native FMU only; build it with --native")
     if name not in BLOCKS:
         raise BuildError(f"no block is called {name!r}; there is {', '.join(BLOCKS)}")
     target = folder / f"{name}.fmu"
