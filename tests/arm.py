@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+import golden
 import numpy as np
 
 from imufmu.estimators.bennett2014 import BLOCK
@@ -85,3 +86,18 @@ def rms(values: np.ndarray) -> float:
 
 def flags(result: Trajectory) -> list[int]:
     return result["status"].astype(int).tolist()
+
+
+def golden_inputs(case: golden.Case, suffix: str = "") -> dict[str, np.ndarray]:
+    """The filtered columns, or those with suffix ``_raw``."""
+    s = np.column_stack([case.inputs[f"s1{suffix}"], case.inputs[f"s2{suffix}"]])
+    return inputs_of(s, golden.columns(case.inputs, f"acc{suffix}", 2))
+
+
+def golden_parameters(name: str, case: golden.Case) -> dict[str, Any]:
+    c = case.parameters
+    same = {key: c[key] for key in ("a1", "a2", "r1", "r2", "r3_slow", "r3_fast", "delta")}
+    Q = np.array(c["Q"])
+    noise = {"q_d": Q[0, 0], "q_1": Q[4, 4] / c["dt"], "q_2": Q[7, 7] / c["dt"], "q_b": Q[8, 8]}  # B[3, 3] is T
+    start = {"initial_angle": (c["x0"][2], c["x0"][5]), "initial_bias": c["x0"][8:], "P0": np.diag(c["P0"])}
+    return same | noise | start | {"variant": VARIANTS[name.split("_")[1]], "sample_period": c["dt"]}

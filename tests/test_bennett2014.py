@@ -21,7 +21,8 @@ from arm import (
     Arm,
     estimate,
     flags,
-    inputs_of,
+    golden_inputs,
+    golden_parameters,
     moved,
     resting,
     rms,
@@ -42,21 +43,6 @@ def arm() -> Arm:
 
 
 # Against the reference vectors
-
-
-def golden_inputs(case: golden.Case, suffix: str = "") -> dict[str, np.ndarray]:
-    """The filtered columns, or those with suffix ``_raw``."""
-    s = np.column_stack([case.inputs[f"s1{suffix}"], case.inputs[f"s2{suffix}"]])
-    return inputs_of(s, golden.columns(case.inputs, f"acc{suffix}", 2))
-
-
-def golden_parameters(name: str, case: golden.Case) -> dict[str, Any]:
-    c = case.parameters
-    same = {key: c[key] for key in ("a1", "a2", "r1", "r2", "r3_slow", "r3_fast", "delta")}
-    Q = np.array(c["Q"])
-    noise = {"q_d": Q[0, 0], "q_1": Q[4, 4] / c["dt"], "q_2": Q[7, 7] / c["dt"], "q_b": Q[8, 8]}  # B[3, 3] is T
-    start = {"initial_angle": (c["x0"][2], c["x0"][5]), "initial_bias": c["x0"][8:], "P0": np.diag(c["P0"])}
-    return same | noise | start | {"variant": VARIANTS[name.split("_")[1]], "sample_period": c["dt"]}
 
 
 def assert_golden(result: Trajectory, case: golden.Case, late: int = 0) -> None:

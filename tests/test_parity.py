@@ -8,6 +8,7 @@ import fmu
 import golden
 import numpy as np
 import pytest
+from arm import golden_inputs, golden_parameters
 from backends import BACKENDS, Backend, InProcess
 
 from imufmu.cosim import System, locate, pack, simulate
@@ -40,6 +41,18 @@ def test_a_record_of_the_reference_vectors_gives_the_numbers_of_the_run_in_proce
     parameters = {p.name: numbers[p.name] for p in block.own_parameters if p.name in numbers}
     parameters["sample_period"] = numbers["dt"]
     expected, actual = (b.run(block, inputs, parameters, rows) for b in (InProcess(), backend))
+    for signal in block.reported:
+        assert np.array_equal(actual[signal.name], expected[signal.name]), signal.name
+
+
+@BACKEND
+@pytest.mark.parametrize("case", golden.names("bennett"))
+def test_a_record_of_an_arm_gives_the_numbers_of_the_run_in_process(case: str, backend: Backend) -> None:
+    """Bit for bit, with every number of the case."""
+    block, record = BLOCKS["bennett2014"], golden.load(case)
+    inputs = {name: values[:500] for name, values in golden_inputs(record).items()}
+    parameters = golden_parameters(case, record)
+    expected, actual = (b.run(block, inputs, parameters, 500) for b in (InProcess(), backend))
     for signal in block.reported:
         assert np.array_equal(actual[signal.name], expected[signal.name]), signal.name
 
