@@ -69,10 +69,7 @@ class Variable:
 
 @dataclass(frozen=True, kw_only=True)
 class Block:
-    """Common part of both kinds of block. ``doc`` is the text for its users, ``reference`` the paper.
-
-    normals: standard normal draws per sample, or at the start of a continuous block.
-    """
+    """Common part of both kinds of block. ``doc`` is the text for its users, ``reference`` the paper."""
 
     name: str
     summary: str
@@ -84,7 +81,7 @@ class Block:
     own_parameters: tuple[Parameter, ...]
     state: tuple[State, ...]
     output: Callable[..., Expressions]
-    normals: int = 0
+    normals: int = 0  # standard normal draws per sample, or at the start of a continuous block
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
@@ -243,7 +240,7 @@ class SampledBlock(Block):
         inputs, finite = self._inputs(u, ca.DM(held), w)
         x = self._flatten("initial", self.state, self.initial(inputs, _namespace(self.parameters, p)))
         y = self._outputs(x, inputs, p)
-        return ca.Function(f"{self.name}_first", [u, p, w], [ca.vertcat(x, *finite), y], ["u", "p", "w"], ["x", "y"])
+        return _function(f"{self.name}_first", [u, p, w], [ca.vertcat(x, *finite), y], ["u", "p", "w"], ["x", "y"])
 
     @cached_property
     def next_function(self) -> Any:
@@ -261,7 +258,7 @@ class SampledBlock(Block):
         x = self._flatten("step", self.state, self.step(state, inputs, _namespace(self.parameters, p)))
         y = self._outputs(x, inputs, p)
         result = [ca.vertcat(x, *finite), y]
-        return ca.Function(f"{self.name}_next", [x_all, u, p, w], result, ["x", "u", "p", "w"], ["x_next", "y"])
+        return _function(f"{self.name}_next", [x_all, u, p, w], result, ["x", "u", "p", "w"], ["x_next", "y"])
 
     def _next_with_slow_step(self, slow_due: Callable[..., Any], slow_step: Callable[..., Expressions]) -> Any:
         """``next_function`` of a block with a slow step.
@@ -277,7 +274,7 @@ class SampledBlock(Block):
         n = total_size(fast_states)
 
         def part(name: str, *results: Any) -> Any:
-            return ca.Function(f"{self.name}_{name}", [x[:n], x[n:], held, u, p, w], results)
+            return _function(f"{self.name}_{name}", [x[:n], x[n:], held, u, p, w], results)
 
         slowed = self._flatten("slow_step", self.state, vars(seen[0]) | dict(slow_step(*seen)))
         step = part("step", self._flatten("step", fast_states, stepped), ca.vertcat(*finite))
@@ -303,7 +300,7 @@ class SampledBlock(Block):
         x = self._symbols("x", self.state)
         inputs, _ = self._inputs(u, ca.DM(self.start_vector(self.inputs)), w)
         y = self._outputs(x, inputs, p)
-        return ca.Function(f"{self.name}_output", [x, u, p, w], [y], ["x", "u", "p", "w"], ["y"])
+        return _function(f"{self.name}_output", [x, u, p, w], [y], ["x", "u", "p", "w"], ["y"])
 
     def _arguments(self) -> tuple[Any, Any, Any]:
         u, p = self._symbols("u", self.inputs), self._symbols("p", self.parameters)
@@ -341,7 +338,7 @@ class ContinuousBlock(Block):
             parameters.normal = standard_normal(w)
         x = self._flatten("initial", self.state, self.initial(parameters))
         held = ca.DM(self.start_vector(self.inputs))
-        return ca.Function(f"{self.name}_initial", [p, w], [ca.vertcat(x, held)], ["p", "w"], ["x"])
+        return _function(f"{self.name}_initial", [p, w], [ca.vertcat(x, held)], ["p", "w"], ["x"])
 
     @cached_property
     def advance_function(self) -> Any:
@@ -363,9 +360,7 @@ class ContinuousBlock(Block):
         k4 = slope(x + h * k3, t + h)
         x_next = x + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
         names = ["x", "u", "p", "t", "h"]
-        return ca.Function(
-            f"{self.name}_advance", [x_all, u, p, t, h], [ca.vertcat(x_next, *finite)], names, ["x_next"]
-        )
+        return _function(f"{self.name}_advance", [x_all, u, p, t, h], [ca.vertcat(x_next, *finite)], names, ["x_next"])
 
     @cached_property
     def output_function(self) -> Any:
@@ -376,7 +371,7 @@ class ContinuousBlock(Block):
         inputs, _ = self._with_held_inputs(u, x_all[n:])
         values = self.output(_namespace(self.state, x_all[:n]), inputs, _namespace(self.parameters, p), t)
         y = self._flatten("output", self.reported, values)
-        return ca.Function(f"{self.name}_output", [x_all, u, p, t], [y], ["x", "u", "p", "t"], ["y"])
+        return _function(f"{self.name}_output", [x_all, u, p, t], [y], ["x", "u", "p", "t"], ["y"])
 
     def _vectors(self) -> tuple[Any, Any, Any]:
         return (
@@ -384,6 +379,11 @@ class ContinuousBlock(Block):
             self._symbols("u", self.inputs),
             self._symbols("p", self.parameters),
         )
+
+
+def _function(name: str, *parts: Any) -> Any:
+    """CasADi Function that computes equal terms once."""
+    return ca.Function(name, *parts, {"cse": True})  # type: ignore[call-overload]
 
 
 def _shaped(flat: Any, shape: Shape) -> Any:

@@ -50,7 +50,7 @@ def output_derivative(block: Block, function: Any) -> Any:
     y = function.call(arguments)[function.index_out("y")][: total_size(block.outputs)]
     du: Any = (ca.SX if is_list else ca.MX).sym("du", u.shape[0])
     dy = ca.densify(ca.jtimes(y, u, du))
-    return ca.Function(f"{function.name()}_derivative", [*arguments, du], [dy])
+    return ca.Function(f"{function.name()}_derivative", [*arguments, du], [dy], {"cse": True})
 
 
 def _equations(block: Block, functions: dict[str, Any]) -> str:
