@@ -245,3 +245,14 @@ def test_ordinary_values_pass_unchanged_even_subnormal_ones() -> None:
     seen = run(MIRROR, {"vector": vector})
     assert np.array_equal(seen["vector_seen"], vector)
     assert not seen["vector_missing"].any()
+
+
+def test_a_term_that_several_equations_write_is_computed_once() -> None:
+    once = replace(MIRROR, step=lambda x, u, p: dict(samples=1, sum=sine(u) + sine(u), product=sine(u) * p.gain))
+    f = once.next_function
+    assert sum(f.instruction_id(i) == ca.OP_SIN for i in range(f.n_instructions())) == 1
+
+
+def sine(u: Any) -> Any:
+    """A new expression at every call."""
+    return ca.sin(u.scalar)

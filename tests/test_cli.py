@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 import time
+import zipfile
 from pathlib import Path
 
 import numpy as np
@@ -51,6 +52,16 @@ def walk(tmp_path):
     }
     write_csv(tmp_path / "walk.csv", columns)
     return tmp_path / "walk.csv"
+
+
+def test_native_fmus_give_the_table_of_the_python_ones(imufmu):
+    arguments = ("run", "pendulum_lee2012", "--stop", 1)
+    code, text, _ = imufmu(*arguments, "--native")
+    assert (code, text) == imufmu(*arguments)[:2] and code == 0
+    code, text, _ = imufmu("pack", "pendulum_lee2012", "native.ssp", "--native")
+    assert code == 0
+    with zipfile.ZipFile("native.ssp") as packed:
+        assert zipfile.ZipFile(packed.open("resources/lee2012.fmu")).namelist().count("sources/fmu.c") == 1
 
 
 def test_every_command_has_help_that_opens_with_an_example(imufmu):
