@@ -1,7 +1,8 @@
 """What a sample costs, each way of running a block beside the others in one run; and what a system costs.
 
-The ways are measured in turn, and again, so that whatever else the machine does meets all of them. Each figure is the
-median of its measurements.
+Samples are measured in processor time, systems in real time. The ways are measured in turn, and again, so that what
+else the machine does meets all of them. Each figure is the median of its measurements, a ratio that of the ratios
+within a turn.
 """
 
 from __future__ import annotations
@@ -44,7 +45,7 @@ _SYSTEM_TIMES = {True: 60.0, False: 6.0}  # s to simulate, native or not
 
 @dataclass(frozen=True)
 class Timing:
-    """Time of a sample (s): median and least of the measurements; ratio to the native FMU in the C host."""
+    """Processor time of a sample (s): median and least; median ratio to the native FMU in the C host."""
 
     block: str
     rate: float  # Hz
@@ -137,9 +138,9 @@ def _measured(trip: Trip, repeats: int, one_more: Callable[[], None]) -> list[Ti
             for way, once in measure.items():
                 seconds[way].append(once())
             one_more()
-    native = median(seconds[NATIVE_IN_C])
+    native = np.array(seconds[NATIVE_IN_C])
     return [
-        Timing(trip.block.name, 1 / trip.period, way, median(some), min(some), median(some) / native)
+        Timing(trip.block.name, 1 / trip.period, way, median(some), min(some), float(np.median(some / native)))
         for way, some in seconds.items()
     ]
 

@@ -1,4 +1,4 @@
-"""Ways to run a block over one record, each with the time that it takes per sample.
+"""Ways to run a block over one record, each with the processor time that it takes per sample.
 
 A round trip of an FMU is: set the inputs, fmi2DoStep, get the outputs. In a C host that is all that happens. A Python
 program calls the same functions through ctypes, with arrays made beforehand; what that adds shows where a native FMU
@@ -17,7 +17,7 @@ from ctypes import CDLL, c_double, c_int, c_size_t, c_void_p, cast
 from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
-from time import perf_counter
+from time import process_time
 from typing import Any
 
 import fmpy
@@ -70,7 +70,7 @@ class Trip:
 
 
 def ways(trip: Trip, folder: Path, stack: ExitStack) -> dict[str, Callable[[], float]]:
-    """By name, functions that measure once and return the time of a sample (s).
+    """By name, functions that measure once and return the processor time of a sample (s).
 
     folder: for the files that they need, until the stack closes what they have opened. Raises BuildError without a C
     compiler.
@@ -161,7 +161,7 @@ def through_ctypes(trip: Trip, fmu: Path, samples: int, stack: ExitStack) -> Cal
     def measure() -> float:
         nonlocal done
         set_real, do_step, get_real = calls.fmi2SetReal, calls.fmi2DoStep, calls.fmi2GetReal
-        began = perf_counter()
+        began = process_time()
         for k in range(done, done + samples):
             u[:] = rows[k % len(rows)]
             statuses = set_real(*to_set)
@@ -169,7 +169,7 @@ def through_ctypes(trip: Trip, fmu: Path, samples: int, stack: ExitStack) -> Cal
             statuses |= get_real(*to_get)
             if statuses:
                 raise SimulationError(f"{fmu}: a call failed at t = {k * trip.period:g} s")
-        took = perf_counter() - began
+        took = process_time() - began
         done += samples
         return took / samples
 
@@ -183,10 +183,10 @@ def in_stream(trip: Trip) -> Callable[[], float]:
     samples = [{name: values[k] for name, values in trip.inputs.items()} for k in range(count)]
 
     def measure() -> float:
-        began = perf_counter()
+        began = process_time()
         for sample in samples:
             stream.update(**sample)
-        return (perf_counter() - began) / len(samples)
+        return (process_time() - began) / len(samples)
 
     return measure
 
@@ -195,9 +195,9 @@ def on_arrays(trip: Trip) -> Callable[[], float]:
     """The whole record in one call."""
 
     def measure() -> float:
-        began = perf_counter()
+        began = process_time()
         run(trip.block, trip.inputs, {"sample_period": trip.period})
-        return (perf_counter() - began) / len(trip.rows)
+        return (process_time() - began) / len(trip.rows)
 
     return measure
 
@@ -211,9 +211,9 @@ def in_vqf(trip: Trip) -> Callable[[], float]:
     rounds = max(1, _SAMPLES["C"] // len(gyro))
 
     def measure() -> float:
-        began = perf_counter()
+        began = process_time()
         for _ in range(rounds):
             filter_.updateBatch(gyro, accel)
-        return (perf_counter() - began) / (rounds * len(gyro))
+        return (process_time() - began) / (rounds * len(gyro))
 
     return measure

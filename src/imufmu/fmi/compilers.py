@@ -98,7 +98,7 @@ def compile_program(source: Path, target: Path, platform: Platform | None = None
     compiler = [sys.executable, "-m", "ziglang", "cc", *target_flags] if has_ziglang() else _system_compiler()
     suffix = (platform or PLATFORMS[own_platform()]).suffix
     libraries = ["-ldl"] if suffix == ".so" else []
-    _compile([*compiler, "-std=c11", "-O2", f"-I{HEADERS}", str(source), "-o", str(target), *libraries], source)
+    _compile([*compiler, "-std=c99", "-O2", f"-I{HEADERS}", str(source), "-o", str(target), *libraries], source)
 
 
 def identity() -> str:
