@@ -31,6 +31,8 @@ typedef struct {
     fmi2SetRealTYPE *set_real;
     fmi2DoStepTYPE *do_step;
     fmi2GetRealTYPE *get_real;
+    fmi2TerminateTYPE *terminate;
+    fmi2FreeInstanceTYPE *free_instance;
     fmi2ValueReference inputs_at[MOST], outputs_at[MOST];
     size_t inputs, outputs;
     double h;
@@ -65,6 +67,8 @@ static void start(Fmu *fmu, const char *path, const char *resources, const char 
     fmu->set_real = (fmi2SetRealTYPE *)find(library, "fmi2SetReal");
     fmu->do_step = (fmi2DoStepTYPE *)find(library, "fmi2DoStep");
     fmu->get_real = (fmi2GetRealTYPE *)find(library, "fmi2GetReal");
+    fmu->terminate = (fmi2TerminateTYPE *)find(library, "fmi2Terminate");
+    fmu->free_instance = (fmi2FreeInstanceTYPE *)find(library, "fmi2FreeInstance");
     fmi2InstantiateTYPE *instantiate = (fmi2InstantiateTYPE *)find(library, "fmi2Instantiate");
     fmi2Component c = instantiate("host", fmi2CoSimulation, guid, resources, &callbacks, fmi2False, fmi2True);
     if (!c) stop("cannot instantiate", path);
@@ -119,7 +123,7 @@ static void print_time(Fmu *fmu, const double *record, size_t rows, size_t round
 
 int main(int count, char **arguments) {
     static Fmu fmu;
-    if (count < 10) stop("host LIBRARY RESOURCES GUID RECORD INPUTS FIRST_OUTPUT OUTPUTS H ROUNDS", "[REFERENCE=VALUE]...");
+    if (count < 10) stop("too few arguments for", arguments[0]);
     fmu.inputs = (size_t)atoi(arguments[5]);
     fmu.outputs = (size_t)atoi(arguments[7]);
     fmu.h = strtod(arguments[8], NULL);
@@ -136,5 +140,8 @@ int main(int count, char **arguments) {
     } else {
         print_outputs(&fmu, record, rows);
     }
-    return fflush(stdout) == 0 ? 0 : 1;
+    if (fflush(stdout) != 0) return 1;
+    require(fmu.terminate(fmu.instance), "fmi2Terminate");
+    fmu.free_instance(fmu.instance);
+    return 0;
 }
