@@ -96,7 +96,6 @@ def test_native_fmus_are_those_of_our_blocks_in_a_system_a_pack_and_a_replay(tmp
     systems = [System.read(locate("pendulum_lee2012"), native=True)]
     systems.append(System.read(pack(locate("pendulum_lee2012"), tmp_path / "a.ssp", native=True)))
     for system in systems:
-        assert [part.model.guid for part in system.parts] == [
-            guid(BLOCKS[name], native=True) for name in ("pendulum", "imu", "lee2012")
-        ]
+        for part in system.parts:
+            assert part.model.guid == guid(BLOCKS[part.model.modelName], native=True)
     assert estimator_fmu("lee2012", native=True) == cached_native_fmu("lee2012")

@@ -10,9 +10,9 @@ import typer
 
 from . import __version__
 from .arguments import check_target, parsed_sets
+from .cli_fmus import build, doctor, info
 from .cli_speed import speed
 from .console import err, notes, out, print_table, progress_bar, written
-from .evaluate.report import Table
 
 EXAMPLES = """IMU attitude estimators as drop-in FMUs, with the plants and IMU models to test them.
 
@@ -75,72 +75,8 @@ def list_() -> None:
         out.print(f"{'device':10} {path.stem:32} parameter set of the sensor imu: {path}")
 
 
-@app.command()
-def build(
-    names: Annotated[list[str], typer.Argument(help="Names of blocks (see: imufmu list), or: all")],
-    folder: Annotated[Path, typer.Option("--folder", "-f", help="Where the FMUs go.")] = Path(),
-    native: Annotated[bool, typer.Option("--native", help="Compiled C, which needs no Python where it runs.")] = False,
-    platforms: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--platform", "-p", help="With --native: a platform inside, or: all. Repeatable. Default: this one."
-        ),
-    ] = None,
-) -> None:
-    """Write FMUs, in Python or as native code.
-
-    \b
-      imufmu build lee2012
-      imufmu build all --folder fmus
-      imufmu build lee2012 --native
-      imufmu build lee2012 --native --platform all        needs: pip install "imufmu[native]"
-      imufmu build imu+lee2012 --native                   both in series, as one FMU
-    """
-    from .fmi.build import build_fmu
-    from .fmi.compilers import PLATFORMS
-    from .fmi.native import build_native
-    from .registry import BLOCKS
-
-    if platforms and not native:
-        raise typer.BadParameter("give it together with --native", param_hint="--platform")
-    for name in BLOCKS if names == ["all"] else names:
-        if native:
-            with progress_bar(f"compiling {name}") as progress:
-                path = build_native(name, folder, [*PLATFORMS] if platforms == ["all"] else platforms, progress)
-        else:
-            path = build_fmu(name, folder)
-        out.print(str(path))
-
-
-@app.command()
-def doctor(fmu: Annotated[Path, typer.Argument(help="An .fmu file")]) -> None:
-    """Say whether and where an FMU will run, and try one step of it. Exit code 1 if something is wrong.
-
-    \b
-      imufmu doctor lee2012.fmu
-    """
-    from .fmi.doctor import Level, examine
-
-    findings = examine(fmu)
-    print_table(Table(["", "what", "finding"], [[f.level.value, f.topic, f.text] for f in findings], words=True))
-    if any(finding.level is Level.PROBLEM for finding in findings):
-        raise typer.Exit(1)
-
-
-@app.command()
-def info(fmu: Annotated[str, typer.Argument(help="Name of a block, or an .fmu file")]) -> None:
-    """Variables, parameters and platforms of an FMU.
-
-    \b
-      imufmu info lee2012
-      imufmu info plant.fmu
-    """
-    from .fmi.info import COLUMNS, describe
-
-    heading, rows = describe(fmu)
-    for line in heading:
-        out.print(line, markup=False)
-    print_table(Table(COLUMNS, rows, words=True))
+for verb in (build, doctor, info):
+    app.command()(verb)
 
 
 @app.command()

@@ -147,7 +147,8 @@ def _measured(trip: Trip, repeats: int, one_more: Callable[[], None]) -> list[Ti
 
 def _system_timings(repeats: int, one_more: Callable[[], None]) -> list[SystemTiming]:
     systems = {native: System.read(locate(_SYSTEM), native=native) for native in _SYSTEM_TIMES} if repeats else {}
-    periods = {f"{component}.sample_period": _SYSTEM_STEP for component in ("imu", "lee2012")}
+    sampled = [n for s in systems.values() for n, i in s.interfaces.items() if "sample_period" in i.variables]
+    periods = {f"{component}.sample_period": _SYSTEM_STEP for component in sampled}
     seconds: dict[bool, list[float]] = {native: [] for native in systems}
     for _ in range(repeats):
         for native, system in systems.items():
