@@ -58,7 +58,8 @@ def test_a_host_gets_the_numbers_of_the_run_in_process_from_each_fmu(name: str, 
     """With constant inputs, so that no host can delay them. Bit for bit, but plants see a time that hosts add up."""
     block = BLOCKS[name]
     instance = instantiate(block)
-    instance.u[:] = 0.25 + 0.5 * np.arange(len(instance.u))
+    within = [(v.signal.minimum, v.signal.maximum) for v in block.variables if v.group == "input"]
+    instance.u[:] = [min(max(0.25 + 0.5 * i, least), most) for i, (least, most) in enumerate(within)]
     instance.initialise(0.0)
     for k in range(STEPS):
         instance.do_step(k * H, H)

@@ -293,7 +293,8 @@ def test_directional_derivatives_are_those_of_repeating_the_last_step_with_other
     actual = np.array(instance.slave.getDirectionalDerivative(outputs, inputs, list(direction)))
     # Rounding of 1e-16 / eps, and a truncation of eps^2: both 1e-10, times what outputs of the size 100 amplify.
     np.testing.assert_allclose(actual, difference, rtol=1e-6, atol=1e-6)
-    assert steps < 2 or np.any(actual != 0)  # a first sample may depend on parameters alone
+    # A first sample may depend on parameters alone; a car feels its controls by their lags only.
+    assert steps < 2 or name == "vehicle" or np.any(actual != 0)
     instance.slave.freeInstance()
 
 

@@ -57,6 +57,12 @@ def test_the_file_holds_what_the_tables_show(result: Speed, tmp_path: Path) -> N
     assert content["machine"]["processor"] and "imufmu" in content["machine"]
 
 
+def test_measuring_leaves_no_path_to_import_from(result: Speed) -> None:
+    """A process started later would take its imufmu from the Python FMU that was measured."""
+    left = [entry for entry in sys.path if "imufmu_speed_" in entry or entry.endswith("resources")]
+    assert left == []
+
+
 @pytest.mark.parametrize(
     ("names", "rates", "fault"),
     [

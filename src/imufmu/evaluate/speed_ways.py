@@ -20,13 +20,13 @@ from pathlib import Path
 from time import process_time
 from typing import Any
 
-import fmpy
 import numpy as np
 from fmpy.fmi2 import FMU2Slave
 
 from ..archives import open_fmu
 from ..block import SampledBlock
 from ..cosim import SimulationError
+from ..cosim.slave import forget_paths
 from ..fmi.build import cached_fmu
 from ..fmi.compilers import compile_program
 from ..fmi.native import cached_native_fmu
@@ -83,8 +83,8 @@ def ways(trip: Trip, folder: Path, stack: ExitStack) -> dict[str, Callable[[], f
     if libpython:
         found["Python FMU, C host"] = in_c_host(trip, python, _SAMPLES["Python"], host, libpython)
     found |= {
-        "native FMU, ctypes": through_ctypes(trip, native, _SAMPLES["ctypes"], stack),
-        "Python FMU, ctypes": through_ctypes(trip, python, _SAMPLES["Python"], stack),
+        "native FMU, ctypes": through_ctypes(trip, native, _SAMPLES["ctypes"], folder / "native", stack),
+        "Python FMU, ctypes": through_ctypes(trip, python, _SAMPLES["Python"], folder / "python", stack),
         "in process, Stream": in_stream(trip),
         "in process, run": on_arrays(trip),
     }
@@ -131,13 +131,14 @@ def _python_environment(libpython: Path) -> dict[str, str]:
     }
 
 
-def through_ctypes(trip: Trip, fmu: Path, samples: int, stack: ExitStack) -> Callable[[], float]:
-    """An FMU in this process, by its C functions."""
-    model = fmpy.read_model_description(str(fmu))
-    folder = fmpy.extract(str(fmu))
+def through_ctypes(trip: Trip, fmu: Path, samples: int, folder: Path, stack: ExitStack) -> Callable[[], float]:
+    """An FMU in this process, unpacked into a new folder, by its C functions."""
+    folder.mkdir()
+    _, model = open_fmu(fmu, folder)
+    stack.callback(forget_paths, folder)
     slave = FMU2Slave(
         guid=model.guid,
-        unzipDirectory=folder,
+        unzipDirectory=str(folder),
         modelIdentifier=model.coSimulation.modelIdentifier,
         instanceName=f"speed_{trip.block.name}",
     )
