@@ -89,31 +89,31 @@ def test_a_result_of_another_shape_is_refused_by_name(value: Any, shape: str) ->
 
 
 def test_a_slow_step_or_a_step_beside_it_that_returns_other_names_is_refused() -> None:
-    with pytest.raises(DeclarationError, match=r"lazy\.slow_step must return \[.*\], returned \[.*'extra'.*\]"):
-        run(replace(LAZY, slow_step=lambda *_: dict(extra=1)), {"scalar": [1.0, 2.0]})
+    with pytest.raises(DeclarationError, match=r"lazy\.slow_steps\[0\] must return \[.*\], returned \[.*'extra'.*\]"):
+        run(replace(LAZY, slow_steps=(lambda *_: dict(extra=1),)), {"scalar": [1.0, 2.0]})
     # The step changes the states declared first: sum without samples is not a beginning.
     with pytest.raises(DeclarationError, match=r"lazy\.step must return \['samples'\], returned \['sum'\]"):
         run(replace(LAZY, step=lambda *_: dict(sum=1)), {"scalar": [1.0, 2.0]})
 
 
-@pytest.mark.parametrize("missing", ["slow_due", "slow_step"])
-def test_half_a_slow_step_is_refused(missing: str) -> None:
-    half: dict[str, Any] = {missing: None}
-    with pytest.raises(DeclarationError, match="lazy: declare both of slow_due and slow_step, or neither"):
+@pytest.mark.parametrize("half", [{"slow_due": None}, {"slow_steps": ()}])
+def test_half_a_slow_step_is_refused(half: dict[str, Any]) -> None:
+    with pytest.raises(DeclarationError, match="lazy: declare both of slow_due and slow_steps, or neither"):
         replace(LAZY, **half)
 
 
-def test_a_slow_step_stands_behind_a_switch_that_skips_it() -> None:
-    """CasADi evaluates only the chosen branch of a Switch; generated C has an if there."""
+@pytest.mark.parametrize("number", [1, 2])
+def test_a_slow_step_stands_behind_a_switch_that_skips_it(number: int) -> None:
+    """CasADi evaluates only the chosen branch of a Switch; generated C has a switch there."""
     graph = LAZY.next_function
-    assert "lazy_slow_step" not in graph.get_function()
-    assert graph.get_function("lazy_switch").class_name() == "Switch"
+    assert not any("slow_step" in name for name in graph.get_function())
+    assert graph.get_function("lazy_slow").class_name() == "Switch"
     code = ca.CodeGenerator("lazy", {"with_header": False})
     code.add(graph)
     text = str(code.dump())
-    name = re.search(r"/\* lazy_slow_step:.*\*/\s*static int (\w+)", text)
+    name = re.search(rf"/\* lazy_slow_step_{number}:.*\*/\s*static int (\w+)", text)
     assert name is not None
-    assert re.findall(r"(.*)\n.*" + name[1] + r"\(arg\+1", text) == ["  if (arg[0] ? casadi_to_int(*arg[0]) : 0) {"]
+    assert re.findall(r"(.*)\n.*" + name[1] + r"\(arg\+1", text) == [f"    case {number}:"]
 
 
 def test_a_block_without_a_slow_step_is_one_list_of_instructions() -> None:

@@ -1,4 +1,4 @@
-"""Small blocks that make the framework visible: one reports all it sees, one the same with a slow step, one has a
+"""Small blocks that make the framework visible: one reports all it sees, one the same with slow steps, one has a
 closed-form solution."""
 
 from __future__ import annotations
@@ -65,28 +65,33 @@ MIRROR = SampledBlock(
     normals=2,
 )
 
-# Every third sample it empties the sum and adds the last input and draw to the product.
+# Every third sample it empties the sum and adds the last input and draw to the product; it mirrors it every fifth.
 LAZY = replace(
     MIRROR,
     name="lazy",
     step=lambda x, u, p: dict(samples=x.samples + 1, sum=x.sum + u.scalar),
-    slow_due=lambda x, u, p: ca.fmod(x.samples, 3) == 0,
-    slow_step=lambda x, u, p: dict(product=x.product + 0.1 * x.sum * u.matrix_previous + u.normal[1], sum=0),
+    slow_due=lambda x, u, p: ca.if_else(ca.fmod(x.samples, 3) == 0, 1, ca.if_else(ca.fmod(x.samples, 5) == 0, 2, 0)),
+    slow_steps=(
+        lambda x, u, p: dict(product=x.product + 0.1 * x.sum * u.matrix_previous + u.normal[1], sum=0),
+        lambda x, u, p: dict(product=-x.product),
+    ),
 )
 
 
 def eager(block: SampledBlock) -> SampledBlock:
-    """The same block with its slow step evaluated at every sample, and its result selected where it is due."""
-    due, slow_step = block.slow_due, block.slow_step
-    assert due is not None and slow_step is not None
+    """The same block with its slow steps evaluated at every sample, and the result of the one that is due selected."""
+    slow_due = block.slow_due
+    assert slow_due is not None
 
     def step(x: SimpleNamespace, u: SimpleNamespace, p: SimpleNamespace) -> dict[str, Any]:
         now = SimpleNamespace(**(vars(x) | block.step(x, u, p)))
-        slowed = slow_step(now, u, p)
-        is_due = due(now, u, p)
-        return {name: ca.if_else(is_due, slowed.get(name, value), value) for name, value in vars(now).items()}
+        due, result = slow_due(now, u, p), vars(now)
+        for number, slow_step in enumerate(block.slow_steps, 1):
+            slowed = slow_step(now, u, p)
+            result = {name: ca.if_else(due == number, slowed.get(name, value), value) for name, value in result.items()}
+        return result
 
-    return replace(block, step=step, slow_due=None, slow_step=None)
+    return replace(block, step=step, slow_due=None, slow_steps=())
 
 
 # q'' = -w^2 q + force + cos(t), q(0) = 1, q'(0) = 0

@@ -9,11 +9,31 @@ static void evaluate_first(Instance *c, double *x) {
     block_first(arg, res, c->integer_work, c->work, 0);
 }
 
-static void evaluate_next(Instance *c, double *x) {
-    const double *arg[N_ARGUMENTS] = {c->state.x, inputs_of(c), parameters_of(c), c->draws};
+#if SLOW_STEPS
+/* In place: most samples change few states. */
+static void evaluate_next(Instance *c, const double *from, double *x) {
+    const double *held = from + N_STATE - N_HELD;
+    double due = 0.0;
+    const double *seen[N_ARGUMENTS] = {from, inputs_of(c), parameters_of(c), c->draws};
+    double *changed[N_RESULTS] = {x, x + N_STATE - N_HELD, &due};
+    block_step(seen, changed, c->integer_work, c->work, 0);
+    if (due != 0.0) {
+        const double *arg[N_ARGUMENTS] = {&due, x, held, inputs_of(c), parameters_of(c), c->draws};
+        double *res[N_RESULTS] = {c->x_next};
+        block_slow(arg, res, c->integer_work, c->work, 0);
+        memcpy(x, c->x_next, (N_STATE - N_HELD) * sizeof(double));
+    }
+    const double *reached[N_ARGUMENTS] = {x, held, inputs_of(c), parameters_of(c), c->draws};
+    double *res[N_RESULTS] = {reported_by(c)};
+    block_report(reached, res, c->integer_work, c->work, 0);
+}
+#else
+static void evaluate_next(Instance *c, const double *from, double *x) {
+    const double *arg[N_ARGUMENTS] = {from, inputs_of(c), parameters_of(c), c->draws};
     double *res[N_RESULTS] = {x, reported_by(c)};
     block_next(arg, res, c->integer_work, c->work, 0);
 }
+#endif
 
 static void remember_inputs(State *s) { memcpy(s->sampled_inputs, s->values, N_INPUTS * sizeof(double)); }
 
@@ -44,11 +64,10 @@ static void take_sample(Instance *c) {
     remember_inputs(s);
     memcpy(s->sampled_from, s->x, sizeof s->x);
     if (s->next_sample == 0) {
-        evaluate_first(c, c->x_next);
+        evaluate_first(c, s->x);
     } else {
-        evaluate_next(c, c->x_next);
+        evaluate_next(c, s->sampled_from, s->x);
     }
-    memcpy(s->x, c->x_next, sizeof s->x);
     s->next_sample++;
     stamp(c);
 }

@@ -6,12 +6,12 @@ Two kinds. A **sampled** block (IMU, estimator) advances at multiples of its par
     step(x, u, p) -> state        every further sample
     output(x, u, p) -> outputs and locals, after either
 
-A costly part of the step that is rarely due (a covariance update, say) may stand apart, declared by both of
+What is costly and rarely due (a covariance update, say) may stand apart, declared by both of
 
-    slow_due(x, u, p) -> condition    asked after every ``step``, with its result
-    slow_step(x, u, p) -> state       where the condition is not 0; really skipped where it is, in C too
+    slow_due(x, u, p) -> number       asked after every ``step``, with its result: which slow step is due; 0 none
+    slow_steps                        1, 2, ...; each (x, u, p) -> state; really skipped where it is not due, in C too
 
-``slow_step`` returns the states that it changes; ``step`` then returns as many as it changes, the first ones declared.
+A slow step returns the states that it changes; ``step`` then returns as many as it changes, the first ones declared.
 
 A **continuous** block (plant) is integrated by RK4 with steps no longer than its parameter ``max_step``:
 
@@ -36,7 +36,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, reduce
 from types import SimpleNamespace
 from typing import Any, Literal
 
@@ -191,7 +191,7 @@ class Block:
         u, values, first = SimpleNamespace(), [], 0
         for signal in self.inputs:
             part = slice(first, first + signal.size)
-            finite = ca.mmin(ca.fabs(raw[part]) <= LARGEST_INPUT)
+            finite = _all(ca.fabs(raw[part]) <= LARGEST_INPUT)
             value = ca.if_else(finite, raw[part], held[part])
             setattr(u, signal.name, _shaped(value, signal.shape))
             setattr(u, f"{signal.name}_previous", _shaped(held[part], signal.shape))
@@ -215,6 +215,20 @@ class Block:
 
 
 @dataclass(frozen=True)
+class SlowParts:
+    """CasADi Functions of one sample of a block with slow steps, for a caller that changes the state in place.
+
+    step: (state and held inputs, u, p, w) -> (the states that it changes, finite inputs, number of the slow step due)
+    slow: (number, state, held inputs before the sample, u, p, w) -> (state); not to be called for number 0
+    report: (state and finite inputs, held inputs before the sample, u, p, w) -> (y)
+    """
+
+    step: Any
+    slow: Any
+    report: Any
+
+
+@dataclass(frozen=True)
 class SampledBlock(Block):
     """A block that advances at multiples of ``sample_period`` (default ``period``, s)."""
 
@@ -222,11 +236,11 @@ class SampledBlock(Block):
     step: Callable[..., Expressions]
     period: float = 0.01
     slow_due: Callable[..., Any] | None = None
-    slow_step: Callable[..., Expressions] | None = None
+    slow_steps: tuple[Callable[..., Expressions], ...] = ()
 
     def __post_init__(self) -> None:
-        if (self.slow_due is None) != (self.slow_step is None):
-            raise DeclarationError(f"{self.name}: declare both of slow_due and slow_step, or neither")
+        if (self.slow_due is None) != (not self.slow_steps):
+            raise DeclarationError(f"{self.name}: declare both of slow_due and slow_steps, or neither")
 
     def _framework_parameters(self) -> tuple[Parameter, ...]:
         period = vocabulary.sample_period(self.period)
@@ -246,10 +260,10 @@ class SampledBlock(Block):
     def next_function(self) -> Any:
         """CasADi Function (x, u, p, w) -> (x, y): every further sample.
 
-        One list of instructions (SX); with a slow step a graph (MX) of such lists, one of them behind a switch.
+        One list of instructions (SX); with slow steps a graph (MX) of such lists, some of them behind a switch.
         """
-        if self.slow_due is not None and self.slow_step is not None:
-            return self._next_with_slow_step(self.slow_due, self.slow_step)
+        if self.slow_parts:
+            return self._next_of_parts(self.slow_parts)
         u, p, w = self._arguments()
         x_all = self._symbols("x", self.held_state)
         n = total_size(self.state)
@@ -260,38 +274,53 @@ class SampledBlock(Block):
         result = [ca.vertcat(x, *finite), y]
         return _function(f"{self.name}_next", [x_all, u, p, w], result, ["x", "u", "p", "w"], ["x_next", "y"])
 
-    def _next_with_slow_step(self, slow_due: Callable[..., Any], slow_step: Callable[..., Expressions]) -> Any:
-        """``next_function`` of a block with a slow step.
-
-        The state is cut in two, so that what only the slow step changes is not copied from part to part.
-        """
+    @cached_property
+    def slow_parts(self) -> SlowParts | None:
+        """The parts of ``next_function`` of a block with slow steps, else None."""
+        if self.slow_due is None:
+            return None
         x, held = self._symbols("x", self.state), self._symbols("held", self.inputs)
         u, p, w = self._arguments()
         inputs, finite = self._inputs(u, held, w)
-        seen = _namespace(self.state, x), inputs, _namespace(self.parameters, p)
-        stepped = self.step(*seen)
-        fast_states = self.state[: len(stepped)]
-        n = total_size(fast_states)
+        parameters, before = _namespace(self.parameters, p), _namespace(self.state, x)
+        stepped = self.step(before, inputs, parameters)
+        fast = self._flatten("step", self.state[: len(stepped)], stepped)
+        n = fast.numel()
+        due = self.slow_due(_namespace(self.state, ca.vertcat(fast, x[n:])), inputs, parameters)
+        step = _function(f"{self.name}_step", [ca.vertcat(x, held), u, p, w], [fast, ca.vertcat(*finite), due])
 
-        def part(name: str, *results: Any) -> Any:
-            return _function(f"{self.name}_{name}", [x[:n], x[n:], held, u, p, w], results)
+        def slow(number: int, slow_step: Callable[..., Expressions]) -> Any:
+            changed = vars(before) | dict(slow_step(before, inputs, parameters))
+            slowed = self._flatten(f"slow_steps[{number - 1}]", self.state, changed)
+            return _function(f"{self.name}_slow_step_{number}", [x, held, u, p, w], [slowed])
 
-        slowed = self._flatten("slow_step", self.state, vars(seen[0]) | dict(slow_step(*seen)))
-        step = part("step", self._flatten("step", fast_states, stepped), ca.vertcat(*finite))
-        due = part("slow_due", ca.SX(slow_due(*seen)) != 0)
-        slow = part("slow_step", slowed[:n], slowed[n:])
-        output = part("output_after", self._outputs(x, inputs, p))
+        choice = [slow(number, slow_step) for number, slow_step in enumerate(self.slow_steps, 1)]
+        arguments = choice[0].mx_in()
+        keep = ca.Function(f"{self.name}_keep", arguments, arguments[:1])
+        return SlowParts(
+            step,
+            ca.Function.conditional(f"{self.name}_slow", [keep, *choice], keep),
+            self._report(x, held, u, p, w),
+        )
 
-        symbols = slow.mx_in()
-        keep = ca.Function(f"{self.name}_keep", symbols, symbols[:2])
-        switch = ca.Function.if_else(f"{self.name}_switch", slow, keep)
-        x_all, (u, p, w) = ca.MX.sym("x", x.numel() + held.numel()), symbols[3:]
-        fast, slow, held = ca.vertsplit(x_all, [0, n, x.numel(), x_all.numel()])
-        fast, finite = step(fast, slow, held, u, p, w)
-        now = fast, slow, held, u, p, w
-        fast, slow = switch(due(*now), *now)
-        result = [ca.vertcat(fast, slow, finite), output(fast, slow, held, u, p, w)]
-        return ca.Function(f"{self.name}_next", [x_all, u, p, w], result, ["x", "u", "p", "w"], ["x_next", "y"])
+    def _report(self, x: Any, held: Any, u: Any, p: Any, w: Any) -> Any:
+        """Function ``report`` of SlowParts: it is given the finite inputs."""
+        inputs, _ = self._inputs(u, held, w)
+        given = self._symbols("finite", self.inputs)
+        vars(inputs).update(vars(_namespace(self.inputs, given)))
+        arguments = [ca.vertcat(x, given), held, u, p, w]
+        return _function(f"{self.name}_report", arguments, [self._outputs(x, inputs, p)])
+
+    def _next_of_parts(self, parts: SlowParts) -> Any:
+        arguments = parts.step.mx_in()
+        x_all, u, p, w = arguments
+        n = total_size(self.state)
+        fast, finite, due = parts.step(*arguments)
+        held = x_all[n:]
+        x = parts.slow(due, ca.vertcat(fast, x_all[fast.numel() : n]), held, u, p, w)
+        x_next = ca.vertcat(x, finite)
+        result = [x_next, parts.report(x_next, held, u, p, w)]
+        return ca.Function(f"{self.name}_next", arguments, result, ["x", "u", "p", "w"], ["x_next", "y"])
 
     @cached_property
     def output_function(self) -> Any:
@@ -384,6 +413,11 @@ class ContinuousBlock(Block):
 def _function(name: str, *parts: Any) -> Any:
     """CasADi Function that computes equal terms once."""
     return ca.Function(name, *parts, {"cse": True})  # type: ignore[call-overload]
+
+
+def _all(conditions: Any) -> Any:
+    """1 where every element of a column is not 0."""
+    return reduce(ca.logic_and, ca.vertsplit(conditions))
 
 
 def _shaped(flat: Any, shape: Shape) -> Any:

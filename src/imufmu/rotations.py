@@ -24,12 +24,12 @@ def norm(v: Any) -> Any:
 
 def unit(v: Any) -> Any:
     """Direction of v (1); zero for v = 0."""
-    return v / norm(v)
+    return v * (1 / norm(v))
 
 
 def root(x: Any) -> Any:
     """Square root of x, of 0 where rounding made x negative."""
-    return ca.sqrt(ca.fmax(x, 0.0) + TINY**2)
+    return ca.sqrt(ca.if_else(x > 0, x, 0) + TINY**2)
 
 
 def angle_of(y: Any, x: Any) -> Any:
@@ -77,9 +77,11 @@ def euler_from_quaternion(q: Any) -> tuple[Any, Any, Any]:
     """Roll, pitch, yaw (rad) of q_NS (4,); roll is 0 where pitch is +-pi/2."""
     R = matrix_from_quaternion(q)
     roll, pitch = roll_pitch(R[2, :].T)
-    # Row 1 of R_NS turned back by pitch and roll: valid at pitch = +-pi/2 too, where R11 = R21 = 0.
-    cos_yaw = ca.cos(roll) * R[1, 1] - ca.sin(roll) * R[1, 2]
-    sin_yaw = ca.sin(roll) * R[0, 2] - ca.cos(roll) * R[0, 1]
+    # R_NS turned back by the roll: valid at pitch = +-pi/2 too, where R11 = R21 = 0. Roll is atan2(sin_roll, cos_roll).
+    sin_roll, cos_roll = R[2, 1], R[2, 2]
+    cos_roll = ca.if_else(ca.logic_and(ca.fabs(sin_roll) < TINY, ca.fabs(cos_roll) < TINY), 1, cos_roll)
+    cos_yaw = cos_roll * R[1, 1] - sin_roll * R[1, 2]
+    sin_yaw = sin_roll * R[0, 2] - cos_roll * R[0, 1]
     return roll, pitch, angle_of(sin_yaw, cos_yaw)
 
 

@@ -27,7 +27,7 @@ def update(x: Any, P: Any, measured: Sequence[int], y: Any, r: Any, accepted: An
     """
     states = list(measured)
     PH = ca.sum2(P[:, states])
-    variance = ca.fmax(ca.sum1(PH[states]), 0)
-    noise = ca.fmax(r, SHARPEST * sum(P[i, i] for i in states))
-    K = ca.if_else(accepted, PH / (variance + noise), 0)
+    variance, finest = ca.sum1(PH[states]), SHARPEST * sum(P[i, i] for i in states)
+    variance, noise = ca.if_else(variance > 0, variance, 0), ca.if_else(r > finest, r, finest)
+    K = ca.if_else(accepted, PH * (1 / (variance + noise)), 0)
     return x + K * (y - ca.sum1(x[states])), symmetric(P - K @ PH.T)

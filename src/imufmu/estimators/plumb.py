@@ -50,6 +50,7 @@ At the start P0 lets the filter begin in the middle of a motion; from rest it is
 
 from __future__ import annotations
 
+from functools import reduce
 from math import radians
 from types import SimpleNamespace
 from typing import Any
@@ -67,29 +68,26 @@ from ..rotations import (
     roll_pitch,
     root,
     rotate_back,
-    skew,
     unit,
 )
 from ..signals import Signal, State, real
 from .direction_filter import first_vertical, has_vertical
-from .kalman import update
+from .plumb_covariance import N_ERRORS, PSI, B, D, V, full, measure, predicted, upper_triangle
 
-PSI, V, B, D = (slice(0, 3), slice(3, 6), slice(6, 9), slice(9, 18))
-N_ERRORS = 18
 SATURATED = 0.95  # of the gyroscope's range
-LARGEST_VARIANCE = 1.0  # rad2 of psi, rad2/s2 of b
 LARGEST_BIAS = 1.0  # rad/s
 LARGEST_GYRO_ERROR = 0.2  # 1, each element of D
 
-I3 = ca.SX.eye(3)
 UP = ca.DM([0, 0, 1])
 
 
 def initial(u: SimpleNamespace, p: SimpleNamespace) -> Expressions:
     """The first sample."""
     std = ca.vertcat(*[p.P0_psi] * 3, *[p.P0_v] * 3, *[p.P0_b] * 3, *[p.P0_D] * 9)
+    q = first_attitude(u, p)
     return dict(
-        q=first_attitude(u, p),
+        q=q,
+        q0=q,
         started=has_vertical(u, p),
         gyro_lp=u.gyro,
         accel_lp=u.accel,
@@ -116,20 +114,18 @@ def empty_block() -> Expressions:
 
 def step(x: SimpleNamespace, u: SimpleNamespace, p: SimpleNamespace) -> Expressions:
     """Every further sample: attitude, sums of the block, test for rest."""
-    w = rate(x, u)
-    q = multiply(x.q, quaternion_from_rotation_vector(w * p.sample_period))  # (1)
+    w, dt = rate(x, u), p.sample_period * x.started
+    q = multiply(x.q, quaternion_from_rotation_vector(w * dt))  # (1)
     R = matrix_from_quaternion(q)
-    R_bar = (matrix_from_quaternion(x.q) + R) / 2
-    blind = ca.fmax(ca.fabs(u.gyro) > SATURATED * p.gyro_range, u.gyro_missing)
-    dt = ca.if_else(x.started, p.sample_period, 0)
+    blind = ca.logic_or(ca.fabs(u.gyro) > SATURATED * p.gyro_range, u.gyro_missing)
     T = ca.if_else(u.accel_missing, 0, dt)
     return dict(
-        q=ca.if_else(x.started, q, first_attitude(u, p)),
-        started=ca.logic_or(x.started, has_vertical(u, p)),
+        q=q,
+        started=x.started,
         **rest_test(x, u, p),
         samples=x.samples + x.started,
         dV=x.dV + R @ u.accel * T,  # (2)
-        S=x.S + R_bar * dt,  # (2)
+        S=x.S + R * dt,  # (2)
         theta=x.theta + w * dt,  # (2)
         T=x.T + T,  # (2)
         blind=x.blind + blind * dt,  # (3)
@@ -147,12 +143,14 @@ def rest_test(x: SimpleNamespace, u: SimpleNamespace, p: SimpleNamespace) -> Exp
     keep = p.rr_l / (p.rr_l + p.sample_period)
     gyro_lp = u.gyro + keep * (x.gyro_lp - u.gyro)
     accel_lp = u.accel + keep * (x.accel_lp - u.accel)
-    missing = ca.fmax(u.gyro_missing, u.accel_missing)
-    steady = ca.logic_and(
+    conditions = (
         ca.sumsqr(u.gyro - gyro_lp) < p.rr_dg**2,
         ca.sumsqr(u.accel - accel_lp) < p.rr_da**2,
+        *ca.vertsplit(ca.fabs(gyro_lp) < p.rr_b),
+        ca.logic_not(u.gyro_missing),
+        ca.logic_not(u.accel_missing),
     )
-    still = ca.logic_and(ca.logic_and(steady, ca.mmax(ca.fabs(gyro_lp)) < p.rr_b), ca.logic_not(missing))
+    still = reduce(ca.logic_and, conditions)
     return dict(gyro_lp=gyro_lp, accel_lp=accel_lp, still_samples=ca.if_else(still, x.still_samples + 1, 0))
 
 
@@ -161,68 +159,65 @@ def at_rest(x: SimpleNamespace, p: SimpleNamespace) -> Any:
     return x.still_samples * p.sample_period >= p.rr_t
 
 
-def block_is_full(x: SimpleNamespace, u: SimpleNamespace, p: SimpleNamespace) -> Any:
-    """1 after m samples, where the slow step is due."""
-    return x.samples >= ca.fmax(1, ca.floor(p.h / p.sample_period + 0.5))
+def slow_due(x: SimpleNamespace, u: SimpleNamespace, p: SimpleNamespace) -> Any:
+    """Which of SLOW_STEPS is due: at the end of a block of m samples, and at the first usable sample."""
+    full_block = (x.samples + 0.5) * p.sample_period > p.h
+    at_end = ca.if_else(at_rest(x, p), RESTING, MOVING)
+    return ca.if_else(x.started, ca.if_else(full_block, at_end, 0), ca.if_else(has_vertical(u, p), BEGINNING, 0))
 
 
-def slow_step(x: SimpleNamespace, u: SimpleNamespace, p: SimpleNamespace) -> Expressions:
-    """The end of a block: prediction of the errors, measurements, correction."""
-    H, resting = x.samples * p.sample_period, at_rest(x, p)
-    v_N = x.v + x.dV - p.g * UP * x.T  # (4)
-    P = predicted(full(x.P), x, H, p)
-    error = ca.SX.zeros(N_ERRORS)
-    moving_variance = p.s_v**2 * root(ca.fmax(x.speed2, p.v2**2)) / p.k_v  # (7)
-    for i, v_i in zip(range(N_ERRORS)[V], ca.vertsplit(v_N), strict=True):
-        error, P = update(error, P, [i], -v_i, ca.if_else(resting, p.rr_v**2, moving_variance) / H)  # (7), (8)
-    for i, b_i in zip(range(N_ERRORS)[B], ca.vertsplit(x.gyro_lp - x.b), strict=True):
-        error, P = update(error, P, [i], b_i, p.rr_g**2 / H, accepted=resting)  # (8)
+def begin(x: SimpleNamespace, u: SimpleNamespace, p: SimpleNamespace) -> Expressions:
+    """The first usable sample."""
+    q = first_attitude(u, p)
+    return dict(q=q, q0=q, started=1)
+
+
+def end_in_motion(x: SimpleNamespace, u: SimpleNamespace, p: SimpleNamespace) -> Expressions:
+    """The end of a block in motion."""
+    v_N, P, H = predicted_block(x, p)
+    variance = p.s_v**2 * root(ca.if_else(x.speed2 > p.v2**2, x.speed2, p.v2**2)) / p.k_v / H
+    error, P = measure(ca.SX.zeros(N_ERRORS), P, V, ca.vertsplit(-v_N), variance)  # (7)
+    return corrected(x, v_N, error, P, H, p)
+
+
+def end_at_rest(x: SimpleNamespace, u: SimpleNamespace, p: SimpleNamespace) -> Expressions:
+    """The end of a block at rest."""
+    v_N, P, H = predicted_block(x, p)
+    error, P = measure(ca.SX.zeros(N_ERRORS), P, V, ca.vertsplit(-v_N), p.rr_v**2 / H)  # (8)
+    error, P = measure(error, P, B, ca.vertsplit(x.gyro_lp - x.b), p.rr_g**2 / H)  # (8)
+    return corrected(x, v_N, error, P, H, p)
+
+
+def predicted_block(x: SimpleNamespace, p: SimpleNamespace) -> tuple[Any, Any, Any]:
+    """Velocity and covariance at the end of a block before its measurements, and its length (s)."""
+    H = x.samples * p.sample_period
+    S = x.S + (matrix_from_quaternion(x.q0) - matrix_from_quaternion(x.q)) * p.sample_period / 2  # (2)
+    return x.v + x.dV - p.g * UP * x.T, predicted(full(x.P), S, x, H, p), H  # (4)
+
+
+def corrected(x: SimpleNamespace, v_N: Any, error: Any, P: Any, H: Any, p: SimpleNamespace) -> Expressions:
+    """State after the measurements of a block."""
     v_N = v_N + error[V]
+    q = unit(multiply(quaternion_from_rotation_vector(error[PSI]), x.q))  # (9)
     return dict(
-        q=unit(multiply(quaternion_from_rotation_vector(error[PSI]), x.q)),  # (9)
+        q=q,
+        q0=q,
         v=v_N,
-        b=bounded(x.b + error[B], LARGEST_BIAS),  # (9)
-        D=bounded(x.D + ca.reshape(error[D], 3, 3).T, LARGEST_GYRO_ERROR),  # (9)
+        b=within(x.b + error[B], LARGEST_BIAS),  # (9)
+        D=within(x.D + ca.reshape(error[D], 3, 3).T, LARGEST_GYRO_ERROR),  # (9)
         P=upper_triangle(P),
         speed2=x.speed2 + H / (p.t_l + H) * (ca.sumsqr(v_N) / 3 - x.speed2),  # (9)
         **empty_block(),
     )
 
 
-def predicted(P: Any, x: SimpleNamespace, H: Any, p: SimpleNamespace) -> Any:
-    """Covariance (18, 18) at the end of a block, from that at its beginning."""
-    R = matrix_from_quaternion(x.q)
-    Phi = ca.SX.eye(N_ERRORS)
-    Phi[PSI, B], Phi[PSI, D], Phi[V, PSI] = -x.S, ca.kron(x.S, x.theta.T / H), -skew(x.dV)  # (5)
-    P = ca.SX(Phi @ P @ Phi.T)
-    W = p.k_g**2 / H * x.theta @ x.theta.T + p.s_s**2 * ca.diag(x.blind)  # (6)
-    P[PSI, PSI] += p.s_g**2 * H * I3 + R @ W @ R.T  # (6)
-    P[V, V] += (p.s_a**2 * H + p.s_m**2 * (H - x.T)) * I3  # (6)
-    P[B, B] += p.s_b**2 * H * I3  # (6)
-    for i in (*range(N_ERRORS)[PSI], *range(N_ERRORS)[B]):
-        shrink = ca.sqrt(LARGEST_VARIANCE / ca.fmax(LARGEST_VARIANCE, P[i, i]))
-        P[i, :] *= shrink
-        P[:, i] *= shrink
-    return ca.triu2symm(ca.triu(P))
+SLOW_STEPS = (end_in_motion, end_at_rest, begin)
+MOVING, RESTING, BEGINNING = 1, 2, 3
 
 
-def upper_triangle(P: Any) -> Any:
-    """Upper triangle of a matrix, flat, row by row."""
-    return ca.vertcat(*(P[i, j] for i in range(N_ERRORS) for j in range(i, N_ERRORS)))
-
-
-def full(triangle: Any) -> Any:
-    """Symmetric matrix of an upper triangle."""
-    P, elements = ca.SX(N_ERRORS, N_ERRORS), iter(ca.vertsplit(triangle))
-    for i in range(N_ERRORS):
-        for j in range(i, N_ERRORS):
-            P[i, j] = P[j, i] = next(elements)
-    return P
-
-
-def bounded(values: Any, largest: float) -> Any:
+def within(values: Any, largest: float) -> Any:
     """Each value within +-largest."""
-    return ca.fmin(ca.fmax(values, -largest), largest)
+    return ca.if_else(values > largest, largest, ca.if_else(values < -largest, -largest, values))
 
 
 def output(x: SimpleNamespace, u: SimpleNamespace, p: SimpleNamespace) -> Expressions:
@@ -230,15 +225,15 @@ def output(x: SimpleNamespace, u: SimpleNamespace, p: SimpleNamespace) -> Expres
     ahead = unit(ca.vertcat(1, rate(x, u) * p.latency / 2))  # to second order in the turn
     q = multiply(x.q, ahead)
     roll, pitch, yaw = euler_from_quaternion(q)
-    P = full(x.P)
+    tilt_covariance = full(x.P)[:2, :2]
     return dict(
         roll=roll,
         pitch=pitch,
         yaw=yaw,
         q_NS=q,
-        vertical=rotate_back(q, UP),
+        vertical=matrix_from_quaternion(q)[2, :].T,
         external_acceleration=ca.if_else(u.accel_missing, 0, u.accel - p.g * rotate_back(x.q, UP)),
-        tilt_std=root(P[0, 0] + P[1, 1]),
+        tilt_std=root(ca.trace(tilt_covariance)),
         gyro_bias=x.b,
         stationary=at_rest(x, p),
         velocity_intensity=root(x.speed2),
@@ -247,7 +242,7 @@ def output(x: SimpleNamespace, u: SimpleNamespace, p: SimpleNamespace) -> Expres
         + v.Status.NOT_INITIALISED * (1 - x.started),
         velocity=x.v,
         gyro_error=x.D,
-        tilt_covariance=P[:2, :2],
+        tilt_covariance=tilt_covariance,
     )
 
 
@@ -349,7 +344,8 @@ Nothing observes yaw: it drifts.""",
         State("S", (3, 3)),
         State("theta", (3,)),
         State("blind", (3,)),
-        # Only the slow step changes these.
+        # Only the slow steps change these.
+        State("q0", (4,)),
         State("v", (3,)),
         State("b", (3,)),
         State("D", (3, 3)),
@@ -358,8 +354,8 @@ Nothing observes yaw: it drifts.""",
     ),
     initial=initial,
     step=step,
-    slow_due=block_is_full,
-    slow_step=slow_step,
+    slow_due=slow_due,
+    slow_steps=SLOW_STEPS,
     output=output,
     period=0.01,
 )

@@ -26,10 +26,11 @@ def generate(block: Block) -> dict[str, str]:
 def _functions(block: Block) -> dict[str, Any]:
     """CasADi Functions by the name that the wrapper calls them by."""
     if isinstance(block, SampledBlock):
-        first, following = block.first_function, block.next_function
+        first, following, parts = block.first_function, block.next_function, block.slow_parts
+        in_place = {"block_step": parts.step, "block_slow": parts.slow, "block_report": parts.report} if parts else {}
         return {
             "block_first": first,
-            "block_next": following,
+            **(in_place or {"block_next": following}),
             "block_first_derivative": output_derivative(block, first),
             "block_next_derivative": output_derivative(block, following),
         }
@@ -89,6 +90,8 @@ def _constants(block: Block, functions: dict[str, Any], references: dict[str, in
         "N_OUTPUTS": total_size(block.outputs),
         "N_REPORTED": total_size(block.reported),
         "N_STATE": total_size(block.held_state),
+        "N_HELD": total_size(block.inputs),  # the last of the state
+        "SLOW_STEPS": int("block_slow" in functions),
         "N_NORMALS": block.normals,
         "N_ARGUMENTS": max(function.sz_arg() for function in needs),
         "N_RESULTS": max(function.sz_res() for function in needs),
