@@ -4,6 +4,8 @@ Every filter with the parameters of its paper and the readings as recorded; then
 (``contenders``), and without the gyroscope bias of the rest that a recording begins with, unless the filter finds the
 bias by itself. Filters of others take part in both.
 
+Estimators of heading and VQF with its magnetometer are compared by ``benchmark_heading``.
+
 The truth comes from another clock than the readings. In BROAD it is ahead by a constant 2.3 ms, in every trial: at 5
 rad/s that alone is 0.7 deg. So every filter is scored against the truth as recorded, and against the delayed truth.
 
@@ -15,6 +17,7 @@ from __future__ import annotations
 
 import csv
 import json
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -25,9 +28,10 @@ import numpy as np
 from ..files import atomic_write
 from ..recordings import Recording, RecordingError, read
 from . import metrics
-from .contenders import Contender, Readings, with_papers_parameters, with_real_parameters
+from .benchmark_heading import HeadingScore, heading_scores, heading_tables
+from .contenders import Contender, Readings, with_magnetometer, with_papers_parameters, with_real_parameters
 from .experiment import Progress
-from .peers import peers
+from .peers import heading_peers, peers
 from .report import Section, Table
 
 DELAY = 0.0023  # s, of the readings of BROAD against its truth
@@ -40,7 +44,10 @@ _LARGEST_BIAS = 0.2  # rad/s
 
 @dataclass(frozen=True)
 class Score:
-    """One filter on one recording. delay: of the truth, s. groups: those that the recording belongs to."""
+    """One filter on one recording. delay: of the truth, s. groups: those that the recording belongs to.
+
+    nees: mean square of the inclination error over tilt_std^2: 1 is honest, more is too sure; NaN without tilt_std.
+    """
 
     contest: str
     contender: str
@@ -49,6 +56,7 @@ class Score:
     recording: str
     groups: Sequence[str]
     inclination_rmse_deg: float
+    nees: float = math.nan
 
 
 @dataclass(frozen=True)
@@ -58,6 +66,7 @@ class Benchmark:
     scores: Sequence[Score]
     groups: Sequence[str]
     notes: Sequence[str]
+    headings: Sequence[HeadingScore] = ()
 
 
 @dataclass(frozen=True)
@@ -85,15 +94,19 @@ def benchmark(
         _Contest("parameters of the papers", [*with_papers_parameters(names), *peers()], 0.0),
         _Contest(f"parameters for real recordings{calibrated}", [*with_real_parameters(names), *peers()], rest),
     ]
+    known = {contender.name for contest in contests for contender in contest.contenders}
+    with_heading = [*(c for c in with_magnetometer() if not names or c.name in known), *heading_peers()]
     paths = sorted(p for p in _entries(folder) if p.suffix.lower() in (".csv", ".mat"))
     order, groups_of = _broad_groups(folder / GROUPS_FILE)
     scores: list[Score] = []
+    headings: list[HeadingScore] = []
     notes: list[str] = []
     for done, path in enumerate(paths):
         try:
             recording = read(path)
             truths = {d: _delayed(recording, d) for d in dict.fromkeys((0.0, delay))}
             scores += _scores(recording, truths, contests, groups_of.get(recording.name, ()), notes)
+            headings += heading_scores(recording, groups_of.get(recording.name, ()), with_heading)
         except (RecordingError, _NothingToScore) as fault:
             notes.append(f"left out: {fault}")
         if progress:
@@ -101,7 +114,7 @@ def benchmark(
     if not scores:
         found = f"; {notes[0]}" if notes else ", or .mat files of BROAD"
         raise ValueError(f"{folder}: no recording to score: put .csv files with a truth there{found}")
-    return Benchmark(scores, [name for name in order if any(name in s.groups for s in scores)], notes)
+    return Benchmark(scores, [name for name in order if any(name in s.groups for s in scores)], notes, headings)
 
 
 class _NothingToScore(ValueError):
@@ -137,12 +150,17 @@ def _scores(
     notes: list[str],
 ) -> Iterator[Score]:
     for contest in contests:
-        as_recorded = recording.at_instants()
+        as_recorded = {name: recording.at_instants()[name] for name in ("gyro", "accel")}
         without_bias = _without_bias(recording, as_recorded, contest.rest, notes)
         for contender in contest.contenders:
             readings = as_recorded if contender.finds_bias else without_bias
             signals = contender.estimate(readings, recording.sample_period)
             vertical_hat = signals["vertical"][recording.sample_index]
+            std = (
+                signals["tilt_std"][recording.sample_index]
+                if "tilt_std" in signals
+                else np.full(len(vertical_hat), np.nan)
+            )
             for delay, vertical in truths.items():
                 counts = np.isfinite(vertical).all(axis=1)
                 error = metrics.inclination_error(vertical_hat[counts], vertical[counts])
@@ -155,6 +173,7 @@ def _scores(
                     recording.name,
                     groups,
                     rmse,
+                    float(np.mean((error / std[counts]) ** 2)),
                 )
 
 
@@ -186,7 +205,8 @@ def _broad_groups(path: Path) -> tuple[list[str], dict[str, list[str]]]:
 def tables(result: Benchmark) -> list[Section]:
     """One table per contest and delay: a row per group, or per recording without groups; a column per filter."""
     contests = dict.fromkeys((s.contest, s.delay) for s in result.scores)
-    return [_table(result, contest, delay) for contest, delay in contests]
+    found = [_table(result, contest, delay) for contest, delay in contests]
+    return [*found, *_honesty(result), *heading_tables(result.headings, result.groups)]
 
 
 def _table(result: Benchmark, contest: str, delay: float) -> Section:
@@ -209,8 +229,24 @@ def _table(result: Benchmark, contest: str, delay: float) -> Section:
     truth = f"truth delayed by {1e3 * delay:g} ms" if delay else "truth as recorded"
     listed = (s for s in scores if s.parameters and not s.contender.endswith(s.parameters))
     parameters = dict.fromkeys(f"{s.contender}: {s.parameters}" for s in listed)
+    why = f"each sample against the truth of {1e3 * delay:g} ms before: in every trial of BROAD it is ahead by 2.3 ms"
+    points = [*([why] if delay else []), *parameters]
     heading = f"Inclination RMSE (deg), {contest}, {truth}"
-    return Section(heading, table=Table(["recordings", *contenders], rows), points=list(parameters))
+    return Section(heading, table=Table(["recordings", *contenders], rows), points=points)
+
+
+def _honesty(result: Benchmark) -> list[Section]:
+    """NEES of every filter with a tilt_std, per recording, against the most delayed truth."""
+    delay = max(s.delay for s in result.scores)
+    scores = [s for s in result.scores if s.delay == delay and math.isfinite(s.nees) and "real" in s.contest]
+    if not scores:
+        return []
+    contenders = list(dict.fromkeys(s.contender for s in scores))
+    by_place = {(s.recording, s.contender): s.nees for s in scores}
+    recordings = list(dict.fromkeys(s.recording for s in scores))
+    rows = [[name, *(f"{by_place[name, c]:.2f}" for c in contenders)] for name in recordings]
+    heading = "NEES of the inclination, parameters for real recordings: 1 is an honest tilt_std, more is too sure"
+    return [Section(heading, table=Table(["recording", *contenders], rows))]
 
 
 def write_scores(path: Path, result: Benchmark) -> None:
@@ -218,8 +254,8 @@ def write_scores(path: Path, result: Benchmark) -> None:
     with atomic_write(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(
-            ["contest", "filter", "parameters", "truth_delay_s", "recording", "groups", "inclination_rmse_deg"]
+            ["contest", "filter", "parameters", "truth_delay_s", "recording", "groups", "inclination_rmse_deg", "nees"]
         )
         for s in result.scores:
             row = [s.contest, s.contender, s.parameters, s.delay, s.recording, " ".join(s.groups)]
-            writer.writerow([*row, f"{s.inclination_rmse_deg:.17g}"])
+            writer.writerow([*row, f"{s.inclination_rmse_deg:.17g}", f"{s.nees:.17g}"])

@@ -16,7 +16,7 @@ import numpy as np
 from ..block import SampledBlock
 from ..registry import ESTIMATORS
 from ..running import run
-from ..vocabulary import ACCEL, GYRO, VERTICAL
+from ..vocabulary import ACCEL, GYRO, MAG, VERTICAL
 
 Readings = Mapping[str, np.ndarray]  # by signal name, (n, 3), NaN where missing
 
@@ -35,6 +35,14 @@ FOR_REAL_RECORDINGS: Mapping[str, Mapping[str, Any]] = {
     "leechoi2018": {"c_b": 0.9 * _LOCAL_G * 0.01 * TILT_TIME, "g": _LOCAL_G, "gyro_index": _MID_RATE},
     # sqrt(2) / cutoff is the time constant.
     "rizun2008": {"cutoff": 2**0.5 / TILT_TIME, "g": _LOCAL_G, "gyro_index": _MID_RATE},
+}
+
+# Its vertical is that of lee2012, with other variances.
+_TILT_OF_ANOTHER = ("zihajehzadeh2014",)
+
+# Magnetic North is North, and the norm of the field indoors that of Berlin's BROAD recordings at rest.
+_FIELD_OF_THE_RECORDING: Mapping[str, Mapping[str, Any]] = {
+    "zihajehzadeh2014": {"m_ref": (0.0, 20.1, -44.9), "h": 44.0, "g": _LOCAL_G, "gyro_index": _MID_RATE}
 }
 
 # Variants of an estimator that its paper treats as different filters.
@@ -72,11 +80,7 @@ def with_real_parameters(names: Sequence[str] = ()) -> list[Contender]:
 
 
 def _blocks(names: Sequence[str]) -> list[SampledBlock]:
-    six_axis = {
-        block.name: block
-        for block in ESTIMATORS
-        if isinstance(block, SampledBlock) and block.inputs == (GYRO, ACCEL) and VERTICAL in block.outputs
-    }
+    six_axis = {block.name: block for block in _of_tilt() if block.name not in _TILT_OF_ANOTHER}
     unknown = [name for name in names if name not in six_axis]
     if unknown:
         raise ValueError(
@@ -84,6 +88,21 @@ def _blocks(names: Sequence[str]) -> list[SampledBlock]:
             f"there is {', '.join(six_axis)}"
         )
     return [six_axis[name] for name in dict.fromkeys(names)] or list(six_axis.values())
+
+
+def with_magnetometer() -> list[Contender]:
+    """The estimators of heading, with parameters for real recordings: North is where the field points."""
+    return [
+        _contender(block, _FIELD_OF_THE_RECORDING.get(block.name, {})) for block in _of_tilt() if MAG in block.inputs
+    ]
+
+
+def _of_tilt() -> list[SampledBlock]:
+    return [
+        block
+        for block in ESTIMATORS
+        if isinstance(block, SampledBlock) and {GYRO, ACCEL} <= set(block.inputs) and VERTICAL in block.outputs
+    ]
 
 
 def _contender(block: SampledBlock, parameters: Mapping[str, Any], name: str = "") -> Contender:
@@ -94,5 +113,5 @@ def _contender(block: SampledBlock, parameters: Mapping[str, Any], name: str = "
 def _estimate(
     block: SampledBlock, parameters: Mapping[str, Any], readings: Readings, sample_period: float
 ) -> Mapping[str, np.ndarray]:
-    inputs = {signal.name: readings[signal.name] for signal in block.inputs}
+    inputs = {signal.name: readings[signal.name] for signal in block.inputs if signal.name in readings}
     return run(block, inputs, {"sample_period": sample_period, **parameters}).values

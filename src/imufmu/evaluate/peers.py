@@ -19,7 +19,12 @@ from .contenders import Contender, Readings
 from .metrics import vertical_of
 
 # What the authors' own example for real data sets.
-_FUSION_SETTINGS = {"gain": 0.5, "gyroscope_range": 2000.0, "acceleration_rejection": 10.0, "rejection_timeout": 5.0}
+_FUSION_SETTINGS: Mapping[str, Any] = {
+    "gain": 0.5,
+    "gyroscope_range": 2000.0,
+    "acceleration_rejection": 10.0,
+    "rejection_timeout": 5.0,
+}
 
 
 def peers() -> list[Contender]:
@@ -31,6 +36,19 @@ def peers() -> list[Contender]:
     if find_spec("imufusion"):
         found.append(Contender("imufusion", _imufusion, _FUSION_SETTINGS))
     return found
+
+
+def heading_peers() -> list[Contender]:
+    """The same, of filters that use a magnetometer."""
+    return [Contender("VQF", _vqf_9_axis, {}, finds_bias=True)] if find_spec("vqf") else []
+
+
+def _vqf_9_axis(readings: Readings, sample_period: float) -> Mapping[str, np.ndarray]:
+    import vqf
+
+    mag = np.ascontiguousarray(hold_missing(readings["mag"]))
+    q_NS = vqf.VQF(sample_period).updateBatch(*_complete(readings), mag)["quat9D"]
+    return {"q_NS": q_NS, "vertical": vertical_of(q_NS)}
 
 
 def _vqf(kind: str, readings: Readings, sample_period: float) -> Mapping[str, np.ndarray]:
