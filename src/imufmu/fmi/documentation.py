@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import inspect
 import io
+import re
+import sys
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -37,9 +39,18 @@ def signal_rows(signals: tuple[Signal, ...]) -> list[dict[str, str]]:
 
 
 def equations(block: Block) -> str:
-    """The module docstring of the block: its equations, symbols and source."""
+    """The module docstring of the block: its equations, symbols and source; then those of the parts that it names.
+
+    A part of the module ``plumb`` is a module ``plumb_...`` beside it.
+    """
     module = inspect.getmodule(block.output)
-    return inspect.cleandoc(module.__doc__ or "") if module else ""
+    if module is None:
+        return ""
+    text = inspect.cleandoc(module.__doc__ or "")
+    package, _, name = module.__name__.rpartition(".")
+    parts = dict.fromkeys(re.findall(rf"\b{name}_\w+", text))
+    modules = {part: sys.modules[f"{package}.{part}"] for part in parts if f"{package}.{part}" in sys.modules}
+    return "\n\n\n".join([text, *(f"{p}\n\n{inspect.cleandoc(m.__doc__ or '')}" for p, m in modules.items())])
 
 
 def documentation_page(block: Block, platforms: Sequence[str] = ()) -> str:
