@@ -67,6 +67,9 @@ UNITS = {
         Unit("m/s2/sqrt(Hz)", None),
         Unit("uT/sqrt(Hz)", None),
         Unit("1/sqrt(Hz)", None),
+        Unit("s/sqrt(Hz)", None),
+        Unit("rad/sqrt(Hz)", None),
+        Unit("rad/sqrt(s)", None),
     )
 }
 

@@ -59,7 +59,9 @@ PREDICTED, PREVIOUS = 0, 1
 STATES = 10
 X, Y, THETA1, OMEGA1, ALPHA1, THETA2, OMEGA2, ALPHA2, BIAS1, BIAS2 = range(STATES)
 ANGLES, RATES, ACCELERATIONS, BIASES = [THETA1, THETA2], [OMEGA1, OMEGA2], [ALPHA1, ALPHA2], [BIAS1, BIAS2]
-S1, S2, S3 = (OMEGA1, BIAS1), (OMEGA1, OMEGA2, BIAS2), (THETA1, THETA2)  # the ones in the rows of H, (15)
+S1, S2, S3 = (  # the rows of H, (15)
+    dict.fromkeys(states, 1) for states in ((OMEGA1, BIAS1), (OMEGA1, OMEGA2, BIAS2), (THETA1, THETA2))
+)
 START_VARIANCES = (1e-6, 1e-6, 1e-4, 1e-4, 1e-2, 1e-4, 1e-4, 1e-2, 1e-6, 1e-6)
 CHANNELS = 6  # of the window: s_1, s_2, A_x, A_y, gyroscope missing, accelerometer missing
 NO_DIRECTION = 1e-5  # m/s2: a shorter gravity vector points nowhere

@@ -7,7 +7,7 @@ without limit in directions that no measurement sees.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping
 from typing import Any
 
 import casadi as ca
@@ -20,14 +20,28 @@ def symmetric(P: Any) -> Any:
     return ca.triu2symm(ca.triu(P))
 
 
-def update(x: Any, P: Any, measured: Sequence[int], y: Any, r: Any, accepted: Any = 1) -> tuple[Any, Any]:
-    """State (n,) and covariance (n, n) after y, the sum of the ``measured`` states, of variance r.
+Row = Mapping[int, Any]  # of a measurement matrix: the coefficients of the states that are measured
+
+
+def update(x: Any, P: Any, row: Row, y: Any, r: Any, accepted: Any = 1) -> tuple[Any, Any]:
+    """State (n,) and covariance (n, n) after y, the sum of coefficient times state over ``row``, of variance r.
 
     P: symmetric. accepted: 0 leaves both as they are.
     """
-    states = list(measured)
-    PH = ca.sum2(P[:, states])
-    variance, finest = ca.sum1(PH[states]), SHARPEST * sum(P[i, i] for i in states)
-    variance, noise = ca.if_else(variance > 0, variance, 0), ca.if_else(r > finest, r, finest)
+    PH, variance = _projected(P, row)
+    finest = SHARPEST * sum(h**2 * P[i, i] for i, h in row.items())
+    noise = ca.if_else(r > finest, r, finest)
     K = ca.if_else(accepted, PH * (1 / (variance + noise)), 0)
-    return x + K * (y - ca.sum1(x[states])), symmetric(P - K @ PH.T)
+    return x + K * (y - sum(h * x[i] for i, h in row.items())), symmetric(P - K @ PH.T)
+
+
+def surprise(P: Any, row: Row, innovation: Any, r: Any) -> Any:
+    """Square of an innovation in units of its variance by P and the variance r of the measurement."""
+    return innovation**2 / (_projected(P, row)[1] + r)
+
+
+def _projected(P: Any, row: Row) -> tuple[Any, Any]:
+    """Covariance (n,) of every state with what the row measures, and the variance of that."""
+    PH = sum(h * P[:, i] for i, h in row.items())
+    variance = sum(h * PH[i] for i, h in row.items())
+    return PH, ca.if_else(variance > 0, variance, 0)

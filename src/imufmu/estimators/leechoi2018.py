@@ -98,7 +98,7 @@ def predict(x: SimpleNamespace, gyro: Any, p: SimpleNamespace) -> tuple[Any, Any
 def update(x: Any, P: Any, y_A: Any, M: Any, accepted: Any) -> tuple[Any, Any]:
     """A posteriori state and covariance; as before if not accepted. M: scalar, the variance of each axis of y_A."""
     for axis in range(3):
-        x, P = kalman.update(x, P, (axis, 3 + axis), y_A[axis], M, accepted)  # (11), (17)
+        x, P = kalman.update(x, P, {axis: 1, 3 + axis: 1}, y_A[axis], M, accepted)  # (11), (17)
     return x, P
 
 

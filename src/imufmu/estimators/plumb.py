@@ -3,7 +3,14 @@
 Over a moment, a tilt and an acceleration look alike to an accelerometer. In the long run they do not: gravity lasts,
 while the velocity of a hand, a limb or a tool stays near zero. Rizun [1] takes velocity for white noise and derives a
 fixed filter. The same model stands here in a Kalman filter that also learns bias, scale and cross-axis errors of the
-gyroscope, follows the liveliness of the motion, and uses rest where there is any.
+gyroscope, follows the liveliness of the motion, uses rest where there is any, and notices a velocity that is no noise.
+
+Its parts, each with its equations:
+
+    plumb_block       the end of a block: velocity as noise, lasting velocity, rest
+    plumb_covariance  prediction of the covariance
+    plumb_vehicle     the speed of a vehicle's wheels
+    plumb_heading     the magnetometer
 
     symbol           here             unit      meaning
     R                x.q              1         attitude, S to N; its yaw is 0 at the start
@@ -11,7 +18,6 @@ gyroscope, follows the liveliness of the motion, and uses rest where there is an
     b, D             x.b, x.D         rad/s, 1  gyroscope bias; scale (diagonal) and cross-axis errors
     psi, dv, db, dD  PSI, V, B, D     ...       errors: R_true = exp([psi]) R, v_true = v + dv, ...
     P                x.P              ...       their covariance, 18 x 18, upper triangle
-    V                x.speed2         m2/s2     mean square of v on one axis, low-passed
     y_g, y_a         u.gyro, u.accel  rad/s, m/s2
 
 Every sample, of period dt, with e_z the up vector in N and dD row by row:
@@ -20,29 +26,13 @@ Every sample, of period dt, with e_z the up vector in N and dD row by row:
     dV += R+ y_a dt,   T += dt,   S += Rbar dt,   theta += w dt                                (2)
     blind += dt on every axis whose gyroscope is saturated                                     (3)
 
-After m = round(h / dt) samples, a block of H = m dt, the slow step. Prediction:
+and after m = round(h / dt) samples, a block of H = m dt, the slow step. x.S sums R+ alone; the end of the block makes
+it S by the attitudes at both ends.
 
-    v += dV - g e_z T                                                                          (4)
-    psi' = psi - S db + S dD theta / H,   dv' = dv - [dV] psi                                  (5)
-    Q = diag(s_g^2 H I + R W R',  s_a^2 H I + s_m^2 (H - T) I,  s_b^2 H I,  0),
-        W = k_g^2 theta theta' / H + s_s^2 diag(blind)                                         (6)
-
-then measurements, one element after the other, and their results:
-
-    in motion   v = 0 with variance s_v^2 q / H,   q = sqrt(max(V, v2^2)) / k_v                (7)
-    at rest     v = 0 with variance rr_v^2 / H,    b = low-passed y_g with rr_g^2 / H          (8)
-    R <- exp([psi]) R,   v += dv,   b += db,   D += dD,   t_l dV/dt = |v|^2 / 3 - V            (9)
-
-(5) is R' = R [w] and v' = R y_a - g e_z, true minus estimated, to first order; dD and the noise of (6) see the mean
-rate of the block, for its change within 0.05 s makes no difference to what is learnt. (7) is white velocity of density
-s_v^2 q ((m/s)^2/Hz), averaged over H. Motion within a reach L takes L / |v|, so its density goes with |v| L:
-s_v^2 / k_v = 0.18 m is that reach. k_g leaves room for errors that grow with the rate and that D cannot hold, such as
-those of timing. It is rest after rr_t of |y_g - low-pass| < rr_dg, |y_a - low-pass| < rr_da and, on each axis, a
-low-passed gyroscope below rr_b; the low-pass has the time constant rr_l.
-
-A gyroscope sample that is not finite is held and counts as saturated on every axis. An accelerometer sample that is not
-finite leaves dV and T as they are. Variances of psi and b stop at 1 (rad, rad/s): yaw is never observed.
-At the start P0 lets the filter begin in the middle of a motion; from rest it is at home at once.
+It is still while |y_g - low-pass| < rr_dg, |y_a - low-pass| < rr_da and, on each axis, the low-passed gyroscope is
+below rr_b; the low-pass has the time constant rr_l. A gyroscope sample that is not finite is held and counts as
+saturated on every axis. An accelerometer sample that is not finite leaves dV and T as they are. At the start P0 lets
+the filter begin in the middle of a motion; from rest it is at home at once.
 
 [1] Rizun, Optimal Wiener Filter for a Body Mounted Inertial Attitude Sensor, Journal of Navigation 61, 2008,
     doi:10.1017/S0373463308004736
@@ -53,7 +43,6 @@ from __future__ import annotations
 from functools import reduce
 from math import radians
 from types import SimpleNamespace
-from typing import Any
 
 import casadi as ca
 
@@ -63,28 +52,25 @@ from ..rotations import (
     euler_from_quaternion,
     matrix_from_quaternion,
     multiply,
-    quaternion_from_euler,
     quaternion_from_rotation_vector,
-    roll_pitch,
     root,
     rotate_back,
     unit,
 )
 from ..signals import Signal, State, real
-from .direction_filter import first_vertical, has_vertical
-from .plumb_covariance import N_ERRORS, PSI, B, D, V, full, measure, predicted, upper_triangle
+from . import plumb_block as block
+from . import plumb_heading as heading
+from . import plumb_vehicle as vehicle
+from .direction_filter import has_vertical
+from .plumb_covariance import N_ERRORS, full, upper_triangle
 
 SATURATED = 0.95  # of the gyroscope's range
-LARGEST_BIAS = 1.0  # rad/s
-LARGEST_GYRO_ERROR = 0.2  # 1, each element of D
-
-UP = ca.DM([0, 0, 1])
 
 
 def initial(u: SimpleNamespace, p: SimpleNamespace) -> Expressions:
     """The first sample."""
     std = ca.vertcat(*[p.P0_psi] * 3, *[p.P0_v] * 3, *[p.P0_b] * 3, *[p.P0_D] * 9)
-    q = first_attitude(u, p)
+    q = block.first_attitude(u, p)
     return dict(
         q=q,
         q0=q,
@@ -92,29 +78,21 @@ def initial(u: SimpleNamespace, p: SimpleNamespace) -> Expressions:
         gyro_lp=u.gyro,
         accel_lp=u.accel,
         still_samples=0,
-        **empty_block(),
+        **block.EMPTY,
         v=ca.SX.zeros(3),
         b=ca.SX.zeros(3),
         D=ca.SX.zeros(3, 3),
         P=upper_triangle(ca.diag(std**2)),
         speed2=0,
+        **block.NEVER_AT_REST,
+        **vehicle.NO_SPEED,
+        **heading.first_heading(q, has_vertical(u, p), u, p),
     )
-
-
-def first_attitude(u: SimpleNamespace, p: SimpleNamespace) -> Any:
-    """q_NS of yaw 0 from one accelerometer sample."""
-    return quaternion_from_euler(*roll_pitch(first_vertical(u, p)), 0)
-
-
-def empty_block() -> Expressions:
-    """The sums over a block, at its beginning."""
-    zero = ca.SX.zeros(3)
-    return dict(samples=0, dV=zero, T=0, S=ca.SX.zeros(3, 3), theta=zero, blind=zero)
 
 
 def step(x: SimpleNamespace, u: SimpleNamespace, p: SimpleNamespace) -> Expressions:
     """Every further sample: attitude, sums of the block, test for rest."""
-    w, dt = rate(x, u), p.sample_period * x.started
+    w, dt = block.rate(x, u), p.sample_period * x.started
     q = multiply(x.q, quaternion_from_rotation_vector(w * dt))  # (1)
     R = matrix_from_quaternion(q)
     blind = ca.logic_or(ca.fabs(u.gyro) > SATURATED * p.gyro_range, u.gyro_missing)
@@ -129,13 +107,8 @@ def step(x: SimpleNamespace, u: SimpleNamespace, p: SimpleNamespace) -> Expressi
         theta=x.theta + w * dt,  # (2)
         T=x.T + T,  # (2)
         blind=x.blind + blind * dt,  # (3)
+        **heading.sum_of_field(R, x, u),
     )
-
-
-def rate(x: SimpleNamespace, u: SimpleNamespace) -> Any:
-    """w: angular velocity (rad/s) as far as the errors of the gyroscope are known."""
-    without_bias = u.gyro - x.b
-    return without_bias + x.D @ without_bias  # (1)
 
 
 def rest_test(x: SimpleNamespace, u: SimpleNamespace, p: SimpleNamespace) -> Expressions:
@@ -149,116 +122,62 @@ def rest_test(x: SimpleNamespace, u: SimpleNamespace, p: SimpleNamespace) -> Exp
         *ca.vertsplit(ca.fabs(gyro_lp) < p.rr_b),
         ca.logic_not(u.gyro_missing),
         ca.logic_not(u.accel_missing),
+        ca.logic_not(vehicle.wheels_turn(u)),
     )
     still = reduce(ca.logic_and, conditions)
     return dict(gyro_lp=gyro_lp, accel_lp=accel_lp, still_samples=ca.if_else(still, x.still_samples + 1, 0))
 
 
-def at_rest(x: SimpleNamespace, p: SimpleNamespace) -> Any:
-    """1 where the sensor has been still long enough."""
-    return x.still_samples * p.sample_period >= p.rr_t
-
-
-def slow_due(x: SimpleNamespace, u: SimpleNamespace, p: SimpleNamespace) -> Any:
-    """Which of SLOW_STEPS is due: at the end of a block of m samples, and at the first usable sample."""
-    full_block = (x.samples + 0.5) * p.sample_period > p.h
-    at_end = ca.if_else(at_rest(x, p), RESTING, MOVING)
-    return ca.if_else(x.started, ca.if_else(full_block, at_end, 0), ca.if_else(has_vertical(u, p), BEGINNING, 0))
-
-
-def begin(x: SimpleNamespace, u: SimpleNamespace, p: SimpleNamespace) -> Expressions:
-    """The first usable sample."""
-    q = first_attitude(u, p)
-    return dict(q=q, q0=q, started=1)
-
-
-def end_in_motion(x: SimpleNamespace, u: SimpleNamespace, p: SimpleNamespace) -> Expressions:
-    """The end of a block in motion."""
-    v_N, P, H = predicted_block(x, p)
-    variance = p.s_v**2 * root(ca.if_else(x.speed2 > p.v2**2, x.speed2, p.v2**2)) / p.k_v / H
-    error, P = measure(ca.SX.zeros(N_ERRORS), P, V, ca.vertsplit(-v_N), variance)  # (7)
-    return corrected(x, v_N, error, P, H, p)
-
-
-def end_at_rest(x: SimpleNamespace, u: SimpleNamespace, p: SimpleNamespace) -> Expressions:
-    """The end of a block at rest."""
-    v_N, P, H = predicted_block(x, p)
-    error, P = measure(ca.SX.zeros(N_ERRORS), P, V, ca.vertsplit(-v_N), p.rr_v**2 / H)  # (8)
-    error, P = measure(error, P, B, ca.vertsplit(x.gyro_lp - x.b), p.rr_g**2 / H)  # (8)
-    return corrected(x, v_N, error, P, H, p)
-
-
-def predicted_block(x: SimpleNamespace, p: SimpleNamespace) -> tuple[Any, Any, Any]:
-    """Velocity and covariance at the end of a block before its measurements, and its length (s)."""
-    H = x.samples * p.sample_period
-    S = x.S + (matrix_from_quaternion(x.q0) - matrix_from_quaternion(x.q)) * p.sample_period / 2  # (2)
-    return x.v + x.dV - p.g * UP * x.T, predicted(full(x.P), S, x, H, p), H  # (4)
-
-
-def corrected(x: SimpleNamespace, v_N: Any, error: Any, P: Any, H: Any, p: SimpleNamespace) -> Expressions:
-    """State after the measurements of a block."""
-    v_N = v_N + error[V]
-    q = unit(multiply(quaternion_from_rotation_vector(error[PSI]), x.q))  # (9)
-    return dict(
-        q=q,
-        q0=q,
-        v=v_N,
-        b=within(x.b + error[B], LARGEST_BIAS),  # (9)
-        D=within(x.D + ca.reshape(error[D], 3, 3).T, LARGEST_GYRO_ERROR),  # (9)
-        P=upper_triangle(P),
-        speed2=x.speed2 + H / (p.t_l + H) * (ca.sumsqr(v_N) / 3 - x.speed2),  # (9)
-        **empty_block(),
-    )
-
-
-SLOW_STEPS = (end_in_motion, end_at_rest, begin)
-MOVING, RESTING, BEGINNING = 1, 2, 3
-
-
-def within(values: Any, largest: float) -> Any:
-    """Each value within +-largest."""
-    return ca.if_else(values > largest, largest, ca.if_else(values < -largest, -largest, values))
-
-
 def output(x: SimpleNamespace, u: SimpleNamespace, p: SimpleNamespace) -> Expressions:
     """Outputs of one sample."""
-    ahead = unit(ca.vertcat(1, rate(x, u) * p.latency / 2))  # to second order in the turn
+    ahead = unit(ca.vertcat(1, block.rate(x, u) * p.latency / 2))  # to second order in the turn
     q = multiply(x.q, ahead)
     roll, pitch, yaw = euler_from_quaternion(q)
     tilt_covariance = full(x.P)[:2, :2]
     return dict(
         roll=roll,
         pitch=pitch,
-        yaw=yaw,
-        q_NS=q,
+        yaw=heading.wrapped(yaw + x.offset),
+        q_NS=heading.turned(x, q),
         vertical=matrix_from_quaternion(q)[2, :].T,
-        external_acceleration=ca.if_else(u.accel_missing, 0, u.accel - p.g * rotate_back(x.q, UP)),
+        external_acceleration=ca.if_else(u.accel_missing, 0, u.accel - p.g * rotate_back(x.q, block.UP)),
         tilt_std=root(ca.trace(tilt_covariance)),
         gyro_bias=x.b,
-        stationary=at_rest(x, p),
+        stationary=block.at_rest(x, p),
         velocity_intensity=root(x.speed2),
         status=v.Status.GYRO_MISSING * u.gyro_missing
         + v.Status.ACCEL_MISSING * u.accel_missing
-        + v.Status.NOT_INITIALISED * (1 - x.started),
+        + v.Status.NOT_INITIALISED * (1 - x.started)
+        + heading.status(x, u),
         velocity=x.v,
         gyro_error=x.D,
         tilt_covariance=tilt_covariance,
+        yaw_offset=x.offset,
+        yaw_offset_std=heading.offset_std(x),
     )
 
 
 BLOCK = SampledBlock(
     name="plumb",
-    summary="Attitude from a 6-axis IMU for any acceleration: error-state Kalman filter that takes velocity for noise",
-    doc="""Estimates roll and pitch, yaw relative to the start, the external acceleration, and the gyroscope's bias,
-scale and cross-axis errors. One set of parameters serves hand-held, body-worn and tool-mounted sensors, from slow to
-violent motion, with or without rest; only gyro_range and g follow the sensor and the place. tilt_std follows the
-motion. Start it at rest if you can: it then knows the attitude at once and the bias within ten seconds. In the middle
-of a motion it needs some ten seconds, in a violent motion longer. Do not use it where velocity changes slowly and for
-long - a car in a roundabout, an aircraft in a turn, a centrifuge: there velocity is not noise, and the horizon tilts. A
-turn slower than rr_b that lasts longer than rr_t is taken for rest, and its rate for bias.
-Nothing observes yaw: it drifts.""",
+    summary="Attitude from a 6- or 9-axis IMU for any acceleration: a Kalman filter that takes velocity for noise",
+    doc="""Estimates roll and pitch, yaw, the external acceleration, and the gyroscope's bias, scale and cross-axis
+errors. One set of parameters serves hand-held, body-worn and tool-mounted sensors, from slow to violent motion, with
+or without rest; only gyro_range and g follow the sensor and the place. tilt_std follows the motion.
+Start it at rest if you can: it then knows the attitude at once and the bias within ten seconds. In the middle of a
+motion it needs some ten seconds, in a violent motion longer.
+Vehicles: after half a second of rest it tells travel from noise, and cornering and braking tilt the horizon by a few
+degrees only, as long as the gyroscope carries it. With forward_speed, forward_speed_valid = 1, mount and imu_position
+they do not tilt it: then what is left is the accelerometer's own bias. imu_position is best seen from the middle of
+the rear axle, whose wheels do not steer. A gyroscope with 1 % of scale error, as consumer devices have, wants P0_D =
+0.01 there.
+Magnetometer: mag turns yaw to North and changes nothing else, not by a bit; its unit does not matter. A disturbed
+field is left out (status 16). Without mag (all zero, or not connected) yaw counts from the start and drifts.
+Do not use it without forward_speed where velocity changes for minutes on end - an aircraft in a turn, a centrifuge -
+nor where it starts in the middle of such a motion: there velocity is no noise, and the horizon tilts. Do not use it
+on a turntable: a turn slower than rr_b that lasts longer than rr_t is taken for rest, and its rate for bias. A
+saturated accelerometer is not noticed.""",
     reference="Model of velocity: T. Rizun, Journal of Navigation 61, 2008, doi:10.1017/S0373463308004736",
-    inputs=(v.GYRO, v.ACCEL),
+    inputs=(v.GYRO, v.ACCEL, v.MAG, *vehicle.INPUTS),
     outputs=(
         v.ROLL,
         v.PITCH,
@@ -276,6 +195,7 @@ Nothing observes yaw: it drifts.""",
         Signal("velocity", "m/s", "Velocity in N, as far as it is not taken for noise", -1e9, 1e9, (3,)),
         Signal("gyro_error", "1", "Scale and cross-axis errors of the gyroscope", -1, 1, (3, 3), nominal=1e-3),
         Signal("tilt_covariance", "rad2", "Covariance of the tilt about x and y of N", -2, 2, (2, 2), nominal=1e-4),
+        *heading.LOCALS,
     ),
     own_parameters=(
         real("g", "m/s2", 9.81, (1, 100), "Magnitude of gravity at the place of use"),
@@ -331,6 +251,9 @@ Nothing observes yaw: it drifts.""",
         real("P0_v", "m/s", 0.5, (0, 1e3), "Standard deviation of the velocity at the start, each axis"),
         real("P0_b", "rad/s", 0.01, (0, 1), "Standard deviation of the gyroscope bias at the start, each axis"),
         real("P0_D", "1", 0.0025, (0, 0.1), "Standard deviation of the scale and cross-axis errors"),
+        *block.PARAMETERS,
+        *vehicle.PARAMETERS,
+        *heading.PARAMETERS,
     ),
     state=(
         State("q", (4,)),
@@ -344,6 +267,7 @@ Nothing observes yaw: it drifts.""",
         State("S", (3, 3)),
         State("theta", (3,)),
         State("blind", (3,)),
+        *heading.FAST_STATES,
         # Only the slow steps change these.
         State("q0", (4,)),
         State("v", (3,)),
@@ -351,11 +275,14 @@ Nothing observes yaw: it drifts.""",
         State("D", (3, 3)),
         State("P", (N_ERRORS * (N_ERRORS + 1) // 2,)),
         State("speed2"),
+        *block.STATES,
+        *vehicle.STATES,
+        *heading.STATES,
     ),
     initial=initial,
     step=step,
-    slow_due=slow_due,
-    slow_steps=SLOW_STEPS,
+    slow_due=block.slow_due,
+    slow_steps=block.SLOW_STEPS,
     output=output,
     period=0.01,
 )

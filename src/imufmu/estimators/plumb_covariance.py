@@ -1,7 +1,7 @@
 """Covariance of the errors of ``plumb``: its prediction over a block, and the measurements at the end of one.
 
-The equation numbers are those of ``plumb``. P is 18 x 18 and symmetric. Its prediction is written out for the rows that
-change, psi and dv: a product with the whole transition matrix would mostly multiply by 0 and 1.
+The equation numbers are those of ``plumb_block``. P is 18 x 18 and symmetric. Its prediction is written out for the
+rows that change, psi and dv: a product with the whole transition matrix would mostly multiply by 0 and 1.
 """
 
 from __future__ import annotations
@@ -55,8 +55,17 @@ def bounded(P: Any) -> Any:
 def measure(error: Any, P: Any, part: slice, values: Sequence[Any], variance: Any) -> tuple[Any, Any]:
     """Errors and covariance after measurements of the three errors ``part``, one after the other."""
     for i, value in zip(range(N_ERRORS)[part], values, strict=True):
-        error, P = update(error, P, [i], value, variance)
+        error, P = update(error, P, {i: 1}, value, variance)
     return error, P
+
+
+def forgotten(P: Any, condition: Any, variance: Any = 0) -> Any:
+    """P; where the condition holds, with errors of v of this variance that are independent of all others."""
+    keep = ca.SX.ones(N_ERRORS)
+    keep[V] = 1 - condition
+    P = P * (keep @ keep.T)
+    P[V, V] += condition * variance * I3
+    return P
 
 
 def upper_triangle(P: Any) -> Any:
