@@ -107,7 +107,6 @@ def step(x: SimpleNamespace, u: SimpleNamespace, p: SimpleNamespace) -> Expressi
         theta=x.theta + w * dt,  # (2)
         T=x.T + T,  # (2)
         blind=x.blind + blind * dt,  # (3)
-        **heading.sum_of_field(R, x, u),
     )
 
 
@@ -267,7 +266,6 @@ saturated accelerometer is not noticed.""",
         State("S", (3, 3)),
         State("theta", (3,)),
         State("blind", (3,)),
-        *heading.FAST_STATES,
         # Only the slow steps change these.
         State("q0", (4,)),
         State("v", (3,)),

@@ -89,7 +89,6 @@ EMPTY: Expressions = dict(
     S=ca.SX.zeros(3, 3),
     theta=ca.SX.zeros(3),
     blind=ca.SX.zeros(3),
-    **heading.NO_FIELD_YET,
 )
 MOVING, ROLLING, RESTING, BEGINNING = 1, 2, 3, 4
 
@@ -131,7 +130,7 @@ def end_in_motion(x: SimpleNamespace, u: SimpleNamespace, p: SimpleNamespace) ->
     error, P = measure(ca.SX.zeros(N_ERRORS), P, V, ca.vertsplit(-v_N), density(v_N, P, x, H, p) / H)  # (7)
     found = ca.logic_not(lost)
     states = dict(levelled=ca.logic_and(x.levelled, found), rolling=ca.logic_and(x.rolling, found), resting=0)
-    return corrected(x, v_N, error, P, H, p) | states
+    return corrected(x, u, v_N, error, P, H, p) | states
 
 
 def density(v_N: Any, P: Any, x: SimpleNamespace, H: Any, p: SimpleNamespace) -> Any:
@@ -151,7 +150,7 @@ def end_in_vehicle(x: SimpleNamespace, u: SimpleNamespace, p: SimpleNamespace) -
     """The end of a block in a vehicle whose wheels tell its speed."""
     v_N, P, H = predicted_block(x, p)
     v_N, error, P, states = vehicle.measured_velocity(v_N, P, rate(x, u), H, x, u, p)
-    after = corrected(x, v_N, error, P, H, p)
+    after = corrected(x, u, v_N, error, P, H, p)
     return after | dict(speed2=x.speed2, lasting=after["v"], resting=0) | states
 
 
@@ -166,7 +165,7 @@ def end_at_rest(x: SimpleNamespace, u: SimpleNamespace, p: SimpleNamespace) -> E
     error, P = measure(error, P, B, ca.vertsplit(x.gyro_lp - x.b), p.rr_g**2 / H)  # (9)
     levelled = ca.logic_or(x.levelled, x.still_samples * p.sample_period >= p.rr_s)
     stands = dict(rolling=vehicle.is_valid(u), disagreed=0, levelled=levelled, resting=1)
-    return corrected(x, v_N, error, P, H, p) | stands
+    return corrected(x, u, v_N, error, P, H, p) | stands
 
 
 def predicted_block(x: SimpleNamespace, p: SimpleNamespace) -> tuple[Any, Any, Any]:
@@ -176,7 +175,9 @@ def predicted_block(x: SimpleNamespace, p: SimpleNamespace) -> tuple[Any, Any, A
     return x.v + x.dV - p.g * UP * x.T, predicted(full(x.P), S, x, H, p), H  # (4)
 
 
-def corrected(x: SimpleNamespace, v_N: Any, error: Any, P: Any, H: Any, p: SimpleNamespace) -> dict[str, Any]:
+def corrected(
+    x: SimpleNamespace, u: SimpleNamespace, v_N: Any, error: Any, P: Any, H: Any, p: SimpleNamespace
+) -> dict[str, Any]:
     """State after the measurements of a block."""
     v_N = v_N + error[V]
     q = unit(multiply(quaternion_from_rotation_vector(error[PSI]), x.q))  # (10)
@@ -192,7 +193,7 @@ def corrected(x: SimpleNamespace, v_N: Any, error: Any, P: Any, H: Any, p: Simpl
         lasting=lasting(v_N, x, H, p),
         level=ca.logic_or(1 - x.levelled, off_level < p.rr_a**2 + (3 * p.g) ** 2 * tilt_variance(P)),
         **EMPTY,
-        **heading.end_block(x, H, p),
+        **heading.end_block(x, u, H, p),
     )
 
 

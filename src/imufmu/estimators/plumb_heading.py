@@ -4,11 +4,11 @@
     delta    x.offset                 rad         true yaw less that of the 6-axis attitude R
     r        x.drift                  rad/s       its rate
     P_d      x.P_heading              ...         covariance of both: (1,1), (1,2), (2,2)
-    f        f                        any         mean field of a block in N: horizontal and upward part
+    f        f                        any         field in N: horizontal and upward part
     f_ref    x.field_ref, x.ref_time  any, s      the undisturbed field, and how long it has been learnt
     f_new    x.field_new, x.new_time  any, s      a field that may succeed it, and how long it has lasted
 
-Every sample adds R y_m to the field of the block. At the end of a block of H seconds:
+At the end of a block of H seconds, with the field R y_m of its last sample:
 
     delta += r H,   P_d <- F P_d F' + diag(s_d^2, s_r^2) H,   F = [1 H; 0 1]                   (15)
     undisturbed while |f - f_ref| < eps_m |f_ref|                                             (16)
@@ -38,7 +38,7 @@ from ..rotations import angle_of, multiply, norm, rotate
 from ..signals import Signal, State, real
 
 NEW_PLACE = 0.5  # rad; what delta may be off by where another field is taken for undisturbed
-NO_FIELD = 1e-9  # in the unit of mag; a horizontal part smaller than this points nowhere
+NO_FIELD = 1e-9  # in the unit of mag; a field smaller than this is none
 
 PARAMETERS = (
     real("declination", "rad", 0.0, (-pi, pi), "Magnetic North seen from true North, towards East"),
@@ -52,7 +52,6 @@ PARAMETERS = (
     real("P0_r", "rad/s", 0.001, (0, 1), "Standard deviation of that drift at the start"),
 )
 
-FAST_STATES = (State("field", (3,)), State("mag_samples"))
 STATES = (
     State("turn", (2,)),  # cosine and sine of delta / 2
     State("offset"),
@@ -71,24 +70,20 @@ LOCALS = (
     Signal("yaw_offset_std", "rad", "One-sigma error of yaw_offset; pi without magnetometer", 0, 1e9, nominal=0.1),
 )
 
-NO_FIELD_YET: Expressions = dict(field=ca.SX.zeros(3), mag_samples=0)
-
-
-def sum_of_field(R: Any, x: SimpleNamespace, u: SimpleNamespace) -> Expressions:
-    """FAST_STATES one sample on. A reading of nothing but zeros adds nothing and does not count."""
-    counts = ca.logic_and(ca.sumsqr(u.mag) > 0, ca.logic_not(u.mag_missing))
-    return dict(field=x.field + R @ u.mag * counts, mag_samples=x.mag_samples + counts)
-
 
 def first_heading(q: Any, started: Any, u: SimpleNamespace, p: SimpleNamespace) -> Expressions:
     """STATES from one sample, delta = 0 where it has no field."""
-    field = rotate(q, u.mag)
-    found = ca.logic_and(ca.logic_and(started, ca.logic_not(u.mag_missing)), has_heading(field))
+    field, found = rotate(q, u.mag), ca.logic_and(started, is_there(u))
     return begin(ca.if_else(found, field, 0), found, p.sample_period, p)
 
 
+def is_there(u: SimpleNamespace) -> Any:
+    """1 where the magnetometer reads a field: all zeros are none."""
+    return ca.logic_and(ca.sumsqr(u.mag) > NO_FIELD**2, ca.logic_not(u.mag_missing))
+
+
 def begin(field: Any, found: Any, T: Any, p: SimpleNamespace) -> Expressions:
-    """STATES by a first field in the frame of v, the mean of T seconds."""
+    """STATES by a first field in the frame of R, of T seconds."""
     f = parts(field)
     offset = ca.if_else(found, by_field(field, p), 0)
     return dict(
@@ -105,18 +100,13 @@ def begin(field: Any, found: Any, T: Any, p: SimpleNamespace) -> Expressions:
     )
 
 
-def has_heading(field: Any) -> Any:
-    """1 where a field in the frame of v has a horizontal direction."""
-    return ca.logic_or(ca.fabs(field[0]) > NO_FIELD, ca.fabs(field[1]) > NO_FIELD)
-
-
 def by_field(field: Any, p: SimpleNamespace) -> Any:
-    """delta by a field in the frame of v."""
+    """delta by a field in the frame of R."""
     return wrapped(angle_of(field[0], field[1]) - p.declination)
 
 
 def parts(field: Any) -> Any:
-    """Horizontal and upward part (2,)."""
+    """Horizontal and upward part (2,) of a field."""
     return ca.vertcat(norm(field[:2]), field[2])
 
 
@@ -129,12 +119,10 @@ def wrapped(angle: Any) -> Any:
     return ca.if_else(angle > pi, angle - 2 * pi, ca.if_else(angle <= -pi, angle + 2 * pi, angle))
 
 
-def end_block(x: SimpleNamespace, H: Any, p: SimpleNamespace) -> Expressions:
+def end_block(x: SimpleNamespace, u: SimpleNamespace, H: Any, p: SimpleNamespace) -> dict[str, Any]:
     """STATES at the end of a block."""
-    field = x.field / ca.if_else(x.mag_samples > 0, x.mag_samples, 1)
-    present = ca.logic_and(x.mag_samples > 0, has_heading(field))
-    first = begin(field, present, x.mag_samples * p.sample_period + ca.logic_not(present), p)
-    following = filtered(field, present, x, H, p)
+    field, present = rotate(x.q, u.mag), is_there(u)
+    first, following = begin(field, present, H, p), filtered(field, present, x, H, p)
     return {name: ca.if_else(x.heading_started, following[name], first[name]) for name in first}
 
 
@@ -183,7 +171,7 @@ def fields_after(f: Any, present: Any, x: SimpleNamespace, H: Any, p: SimpleName
 
 
 def turned(x: SimpleNamespace, q: Any) -> Any:
-    """q_NS with North, of q_NS in the frame of v."""
+    """q_NS with North, of q_NS in the frame of R."""
     return multiply(ca.vertcat(x.turn[0], 0, 0, x.turn[1]), q)
 
 
