@@ -24,7 +24,7 @@ def norm(v: Any) -> Any:
 
 def unit(v: Any) -> Any:
     """Direction of v (1); zero for v = 0."""
-    return v * (1 / norm(v))
+    return v / norm(v)
 
 
 def root(x: Any) -> Any:

@@ -31,7 +31,7 @@ def update(x: Any, P: Any, row: Row, y: Any, r: Any, accepted: Any = 1) -> tuple
     PH, variance = _projected(P, row)
     finest = SHARPEST * sum(h**2 * P[i, i] for i, h in row.items())
     noise = ca.if_else(r > finest, r, finest)
-    K = ca.if_else(accepted, PH * (1 / (variance + noise)), 0)
+    K = ca.if_else(accepted, PH / (variance + noise), 0)
     return x + K * (y - sum(h * x[i] for i, h in row.items())), symmetric(P - K @ PH.T)
 
 

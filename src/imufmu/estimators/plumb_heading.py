@@ -34,7 +34,7 @@ import casadi as ca
 
 from .. import vocabulary as v
 from ..block import Expressions
-from ..rotations import angle_of, multiply, norm, rotate
+from ..rotations import angle_of, multiply, norm, root, rotate
 from ..signals import Signal, State, real
 
 NEW_PLACE = 0.5  # rad; what delta may be off by where another field is taken for undisturbed
@@ -182,4 +182,4 @@ def status(x: SimpleNamespace, u: SimpleNamespace) -> Any:
 
 def offset_std(x: SimpleNamespace) -> Any:
     """Standard deviation of delta; pi before there is a heading."""
-    return ca.if_else(x.heading_started, ca.sqrt(ca.fmax(x.P_heading[0], 0) + 1e-300), pi)
+    return ca.if_else(x.heading_started, root(x.P_heading[0]), pi)
