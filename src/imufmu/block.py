@@ -36,7 +36,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property, reduce
+from functools import cached_property
 from types import SimpleNamespace
 from typing import Any, Literal
 
@@ -44,8 +44,10 @@ import casadi as ca
 import numpy as np
 
 from . import vocabulary
+from .expressions import all_of, function, namespace, shaped
 from .noise import standard_normal
-from .signals import DeclarationError, Parameter, Shape, Signal, State, total_size
+from .signals import DeclarationError, Parameter, Signal, State, total_size
+from .slow_parts import SlowParts, one_of
 
 LARGEST_INPUT = 1e30  # larger magnitudes count as not finite: in a covariance their powers would overflow
 
@@ -191,10 +193,10 @@ class Block:
         u, values, first = SimpleNamespace(), [], 0
         for signal in self.inputs:
             part = slice(first, first + signal.size)
-            finite = _all(ca.fabs(raw[part]) <= LARGEST_INPUT)
+            finite = all_of(ca.fabs(raw[part]) <= LARGEST_INPUT)
             value = ca.if_else(finite, raw[part], held[part])
-            setattr(u, signal.name, _shaped(value, signal.shape))
-            setattr(u, f"{signal.name}_previous", _shaped(held[part], signal.shape))
+            setattr(u, signal.name, shaped(value, signal.shape))
+            setattr(u, f"{signal.name}_previous", shaped(held[part], signal.shape))
             setattr(u, f"{signal.name}_missing", 1 - finite)
             values.append(value)
             first += signal.size
@@ -212,20 +214,6 @@ class Block:
                 raise DeclarationError(f"{self.name}.{what}: {item.name} has shape {value.shape}, not {item.shape}")
             columns.append(ca.vec(value.T) if len(item.shape) == 2 else ca.vec(value))
         return ca.densify(ca.vertcat(*columns))
-
-
-@dataclass(frozen=True)
-class SlowParts:
-    """CasADi Functions of one sample of a block with slow steps, for a caller that changes the state in place.
-
-    step: (state and held inputs, u, p, w) -> (the states that it changes, finite inputs, number of the slow step due)
-    slow: (number, state, held inputs before the sample, u, p, w) -> (state); not to be called for number 0
-    report: (state and finite inputs, held inputs before the sample, u, p, w) -> (y)
-    """
-
-    step: Any
-    slow: Any
-    report: Any
 
 
 @dataclass(frozen=True)
@@ -252,9 +240,9 @@ class SampledBlock(Block):
         u, p, w = self._arguments()
         held = self.start_vector(self.inputs)
         inputs, finite = self._inputs(u, ca.DM(held), w)
-        x = self._flatten("initial", self.state, self.initial(inputs, _namespace(self.parameters, p)))
+        x = self._flatten("initial", self.state, self.initial(inputs, namespace(self.parameters, p)))
         y = self._outputs(x, inputs, p)
-        return _function(f"{self.name}_first", [u, p, w], [ca.vertcat(x, *finite), y], ["u", "p", "w"], ["x", "y"])
+        return function(f"{self.name}_first", [u, p, w], [ca.vertcat(x, *finite), y], ["u", "p", "w"], ["x", "y"])
 
     @cached_property
     def next_function(self) -> Any:
@@ -263,16 +251,16 @@ class SampledBlock(Block):
         One list of instructions (SX); with slow steps a graph (MX) of such lists, some of them behind a switch.
         """
         if self.slow_parts:
-            return self._next_of_parts(self.slow_parts)
+            return self.slow_parts.in_a_row(f"{self.name}_next")
         u, p, w = self._arguments()
         x_all = self._symbols("x", self.held_state)
         n = total_size(self.state)
         inputs, finite = self._inputs(u, x_all[n:], w)
-        state = _namespace(self.state, x_all[:n])
-        x = self._flatten("step", self.state, self.step(state, inputs, _namespace(self.parameters, p)))
+        state = namespace(self.state, x_all[:n])
+        x = self._flatten("step", self.state, self.step(state, inputs, namespace(self.parameters, p)))
         y = self._outputs(x, inputs, p)
         result = [ca.vertcat(x, *finite), y]
-        return _function(f"{self.name}_next", [x_all, u, p, w], result, ["x", "u", "p", "w"], ["x_next", "y"])
+        return function(f"{self.name}_next", [x_all, u, p, w], result, ["x", "u", "p", "w"], ["x_next", "y"])
 
     @cached_property
     def slow_parts(self) -> SlowParts | None:
@@ -282,45 +270,28 @@ class SampledBlock(Block):
         x, held = self._symbols("x", self.state), self._symbols("held", self.inputs)
         u, p, w = self._arguments()
         inputs, finite = self._inputs(u, held, w)
-        parameters, before = _namespace(self.parameters, p), _namespace(self.state, x)
+        parameters, before = namespace(self.parameters, p), namespace(self.state, x)
         stepped = self.step(before, inputs, parameters)
         fast = self._flatten("step", self.state[: len(stepped)], stepped)
         n = fast.numel()
-        due = self.slow_due(_namespace(self.state, ca.vertcat(fast, x[n:])), inputs, parameters)
-        step = _function(f"{self.name}_step", [ca.vertcat(x, held), u, p, w], [fast, ca.vertcat(*finite), due])
+        due = self.slow_due(namespace(self.state, ca.vertcat(fast, x[n:])), inputs, parameters)
+        step = function(f"{self.name}_step", [ca.vertcat(x, held), u, p, w], [fast, ca.vertcat(*finite), due])
 
         def slow(number: int, slow_step: Callable[..., Expressions]) -> Any:
             changed = vars(before) | dict(slow_step(before, inputs, parameters))
             slowed = self._flatten(f"slow_steps[{number - 1}]", self.state, changed)
-            return _function(f"{self.name}_slow_step_{number}", [x, held, u, p, w], [slowed])
+            return function(f"{self.name}_slow_step_{number}", [x, held, u, p, w], [slowed])
 
         choice = [slow(number, slow_step) for number, slow_step in enumerate(self.slow_steps, 1)]
-        arguments = choice[0].mx_in()
-        keep = ca.Function(f"{self.name}_keep", arguments, arguments[:1])
-        return SlowParts(
-            step,
-            ca.Function.conditional(f"{self.name}_slow", [keep, *choice], keep),
-            self._report(x, held, u, p, w),
-        )
+        return SlowParts(step, one_of(f"{self.name}_slow", choice), self._report(x, held, u, p, w))
 
     def _report(self, x: Any, held: Any, u: Any, p: Any, w: Any) -> Any:
         """Function ``report`` of SlowParts: it is given the finite inputs."""
         inputs, _ = self._inputs(u, held, w)
         given = self._symbols("finite", self.inputs)
-        vars(inputs).update(vars(_namespace(self.inputs, given)))
+        vars(inputs).update(vars(namespace(self.inputs, given)))
         arguments = [ca.vertcat(x, given), held, u, p, w]
-        return _function(f"{self.name}_report", arguments, [self._outputs(x, inputs, p)])
-
-    def _next_of_parts(self, parts: SlowParts) -> Any:
-        arguments = parts.step.mx_in()
-        x_all, u, p, w = arguments
-        n = total_size(self.state)
-        fast, finite, due = parts.step(*arguments)
-        held = x_all[n:]
-        x = parts.slow(due, ca.vertcat(fast, x_all[fast.numel() : n]), held, u, p, w)
-        x_next = ca.vertcat(x, finite)
-        result = [x_next, parts.report(x_next, held, u, p, w)]
-        return ca.Function(f"{self.name}_next", arguments, result, ["x", "u", "p", "w"], ["x_next", "y"])
+        return function(f"{self.name}_report", arguments, [self._outputs(x, inputs, p)])
 
     @cached_property
     def output_function(self) -> Any:
@@ -329,7 +300,7 @@ class SampledBlock(Block):
         x = self._symbols("x", self.state)
         inputs, _ = self._inputs(u, ca.DM(self.start_vector(self.inputs)), w)
         y = self._outputs(x, inputs, p)
-        return _function(f"{self.name}_output", [x, u, p, w], [y], ["x", "u", "p", "w"], ["y"])
+        return function(f"{self.name}_output", [x, u, p, w], [y], ["x", "u", "p", "w"], ["y"])
 
     def _arguments(self) -> tuple[Any, Any, Any]:
         u, p = self._symbols("u", self.inputs), self._symbols("p", self.parameters)
@@ -342,8 +313,8 @@ class SampledBlock(Block):
         return inputs, finite
 
     def _outputs(self, x: Any, inputs: SimpleNamespace, p: Any) -> Any:
-        parameters = _namespace(self.parameters, p)
-        return self._flatten("output", self.reported, self.output(_namespace(self.state, x), inputs, parameters))
+        parameters = namespace(self.parameters, p)
+        return self._flatten("output", self.reported, self.output(namespace(self.state, x), inputs, parameters))
 
 
 @dataclass(frozen=True)
@@ -362,12 +333,12 @@ class ContinuousBlock(Block):
     def initial_function(self) -> Any:
         """CasADi Function (p, w) -> (x); w are ``normals`` uniform draws."""
         p, w = self._symbols("p", self.parameters), ca.SX.sym("w", self.normals)
-        parameters = _namespace(self.parameters, p)
+        parameters = namespace(self.parameters, p)
         if self.normals:
             parameters.normal = standard_normal(w)
         x = self._flatten("initial", self.state, self.initial(parameters))
         held = ca.DM(self.start_vector(self.inputs))
-        return _function(f"{self.name}_initial", [p, w], [ca.vertcat(x, held)], ["p", "w"], ["x"])
+        return function(f"{self.name}_initial", [p, w], [ca.vertcat(x, held)], ["p", "w"], ["x"])
 
     @cached_property
     def advance_function(self) -> Any:
@@ -376,10 +347,10 @@ class ContinuousBlock(Block):
         t, h = ca.SX.sym("t"), ca.SX.sym("h")
         n = total_size(self.state)
         inputs, finite = self._with_held_inputs(u, x_all[n:])
-        parameters = _namespace(self.parameters, p)
+        parameters = namespace(self.parameters, p)
 
         def slope(state: Any, time: Any) -> Any:
-            derivative = self.dynamics(_namespace(self.state, state), inputs, parameters, time)
+            derivative = self.dynamics(namespace(self.state, state), inputs, parameters, time)
             return self._flatten("dynamics", self.state, derivative)
 
         x = x_all[:n]
@@ -389,7 +360,7 @@ class ContinuousBlock(Block):
         k4 = slope(x + h * k3, t + h)
         x_next = x + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
         names = ["x", "u", "p", "t", "h"]
-        return _function(f"{self.name}_advance", [x_all, u, p, t, h], [ca.vertcat(x_next, *finite)], names, ["x_next"])
+        return function(f"{self.name}_advance", [x_all, u, p, t, h], [ca.vertcat(x_next, *finite)], names, ["x_next"])
 
     @cached_property
     def output_function(self) -> Any:
@@ -398,9 +369,9 @@ class ContinuousBlock(Block):
         t = ca.SX.sym("t")
         n = total_size(self.state)
         inputs, _ = self._with_held_inputs(u, x_all[n:])
-        values = self.output(_namespace(self.state, x_all[:n]), inputs, _namespace(self.parameters, p), t)
+        values = self.output(namespace(self.state, x_all[:n]), inputs, namespace(self.parameters, p), t)
         y = self._flatten("output", self.reported, values)
-        return _function(f"{self.name}_output", [x_all, u, p, t], [y], ["x", "u", "p", "t"], ["y"])
+        return function(f"{self.name}_output", [x_all, u, p, t], [y], ["x", "u", "p", "t"], ["y"])
 
     def _vectors(self) -> tuple[Any, Any, Any]:
         return (
@@ -408,26 +379,3 @@ class ContinuousBlock(Block):
             self._symbols("u", self.inputs),
             self._symbols("p", self.parameters),
         )
-
-
-def _function(name: str, *parts: Any) -> Any:
-    """CasADi Function that computes equal terms once."""
-    return ca.Function(name, *parts, {"cse": True})  # type: ignore[call-overload]
-
-
-def _all(conditions: Any) -> Any:
-    """1 where every element of a column is not 0."""
-    return reduce(ca.logic_and, ca.vertsplit(conditions))
-
-
-def _shaped(flat: Any, shape: Shape) -> Any:
-    """Flat row-by-row column as an expression of the declared shape."""
-    return ca.reshape(flat, shape[1], shape[0]).T if len(shape) == 2 else flat
-
-
-def _namespace(items: Sequence[Signal | State], flat: Any) -> SimpleNamespace:
-    result, first = SimpleNamespace(), 0
-    for item in items:
-        setattr(result, item.name, _shaped(flat[first : first + item.size], item.shape))
-        first += item.size
-    return result
