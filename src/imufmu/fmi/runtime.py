@@ -13,7 +13,19 @@ from pathlib import Path
 
 PACKAGE = Path(__file__).parents[1]
 
-_MODULES = ("__init__", "signals", "vocabulary", "rotations", "noise", "block", "instance", "fmi/slave", "fmi/runtime")
+_MODULES = (
+    "__init__",
+    "signals",
+    "vocabulary",
+    "rotations",
+    "noise",
+    "expressions",
+    "slow_parts",
+    "block",
+    "instance",
+    "fmi/slave",
+    "fmi/runtime",
+)
 _FOLDERS = ("estimators", "plants", "sensors")
 
 
