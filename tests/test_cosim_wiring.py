@@ -72,6 +72,11 @@ def test_fitting_connections_become_links(tmp_path: Path) -> None:
     )
 
 
+def test_an_input_with_a_value_of_the_description_is_not_noted_as_idle(tmp_path: Path) -> None:
+    system = read(tmp_path, [], bindings={"plant": binding({"torque": ("Real", 1, None)})})
+    assert not [note for note in system.notes if "torque" in note]
+
+
 def test_all_problems_are_told_at_once(tmp_path: Path) -> None:
     connections = ["plant.w -> sensor.force", "plant.f -> sensor.rate", "plant.count -> sensor.armed"]
     assert len(problems(tmp_path, connections, bindings={"sensor": binding({"rnage": ("Real", 1, None)})})) == 4

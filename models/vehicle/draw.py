@@ -12,7 +12,8 @@ from matplotlib.figure import Figure
 from imufmu.cosim import Result, simulate
 from imufmu.plants.vehicle_driver import LANE_LENGTHS, LANE_OFFSET, lane_widths
 
-CAR, MARK, ESTIMATES = "#26323f", "#e07a1f", {"lee2012": "#d1495b", "plumb": "#2e86ab"}
+CAR, MARK = "#26323f", "#e07a1f"
+ESTIMATES = {"lee2012": "#d1495b", "rizun2008": "#edae49", "plumb_alone": "#6a994e", "plumb": "#2e86ab"}
 RECORDED = [f"plant.{name}" for name in ("position", "vertical", "lateral_acceleration", "skeleton")]
 RECORDED += [f"{name}.vertical" for name in ESTIMATES]
 FLOOR = [0, 3, 6, 9, 0]  # corners of the floor in the skeleton, once round

@@ -56,10 +56,6 @@ def find_links(
         feeders[target] = link
         if (unit_of(link.source[1]) is None) != (unit_of(link.target[1]) is None) and connection.same_units:
             notes.append(f"{link}: one end does not name its unit; taken for the same")
-    for interface in interfaces.values():
-        free = [v.name for v in interface.of("input") if (interface.component, v.name) not in feeders]
-        if free:
-            notes.append(f"{interface.component}: not connected, at their start values: {', '.join(free)}")
     return tuple(feeders.values())
 
 

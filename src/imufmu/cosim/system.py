@@ -6,7 +6,7 @@ import os
 import shutil
 import tempfile
 import weakref
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -116,6 +116,7 @@ def _read(path: Path, native: bool, inside: Path | None = None) -> System:
     settings = bound_settings(description, interfaces, problems)
     if problems:
         raise WiringError(path, problems)
+    notes += _idle_inputs(interfaces, links, settings)
     return System(path, description, tuple(parts), links, settings, tuple(notes))
 
 
@@ -145,6 +146,18 @@ def _fmu_file(component: Component, path: Path, native: bool) -> Path:
 
 def _interface(part: Part) -> Interface:
     return Interface(part.name, {variable.name: variable for variable in part.model.modelVariables})
+
+
+def _idle_inputs(interfaces: Mapping[str, Interface], links: Sequence[Link], settings: Sequence[Setting]) -> list[str]:
+    """A note per component with inputs that nothing feeds and no parameter set gives a value."""
+    given = {(link.target[0], link.target[1].name) for link in links}
+    given |= {(setting.component, setting.variable.name) for setting in settings}
+    notes = []
+    for interface in interfaces.values():
+        idle = [v.name for v in interface.of("input") if (interface.component, v.name) not in given]
+        if idle:
+            notes.append(f"{interface.component}: not connected, at their start values: {', '.join(idle)}")
+    return notes
 
 
 def _instance_problems(parts: list[Part]) -> list[str]:
