@@ -25,10 +25,13 @@ class Reference:
     D: np.ndarray = field(default_factory=lambda: np.zeros((3, 3)))
     speed2: float = 0.0
     lasting: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    fresh: float = 0.0
     still: int = 0
     level: bool = True
     levelled: bool = False
     resting: bool = False
+    travels: bool = False
+    quiet: float = 0.0
 
     def __post_init__(self) -> None:
         p = self.p
@@ -71,12 +74,14 @@ class Reference:
         return self.still * self.p["sample_period"] >= self.p["rr_t"] and self.level
 
     def density(self, P: np.ndarray, H: float) -> float:
-        """Of the velocity in motion."""
+        """Of the velocity in motion; ``travels`` says whether it lasts."""
         p = self.p
         noise = p["s_v"] ** 2 * math.sqrt(max(self.speed2, p["v2"] ** 2)) / p["k_v"]
         lasting = self.lasting + H / (p["t_s"] + H) * (self.v - self.lasting)
-        excess = lasting @ lasting / 3 - 4 * (noise / (2 * p["t_s"]) + np.trace(P[3:6, 3:6]) / 3)
-        return float(noise + 2 * p["t_v"] * max(excess, 0.0) * self.levelled)
+        excess = lasting @ lasting / 3 - 4 * noise / (2 * p["t_s"])
+        self.travels = bool(excess > 0)
+        expected = max(excess - 4 * np.trace(P[3:6, 3:6]) / 3, self.fresh * p["v_0"] ** 2)
+        return float(noise + 2 * p["t_v"] * expected * self.levelled)
 
     def end_block(self, H: float) -> None:
         p, resting = self.p, self.at_rest()
@@ -120,6 +125,9 @@ class Reference:
         limit = p["rr_a"] ** 2 + 9 * p["g"] ** 2 * (self.P[0, 0] + self.P[1, 1])
         self.level = bool(off_level < limit or not self.levelled)
         self.resting = resting
+        self.fresh = 1.0 if resting else self.fresh * p["t_0"] / (p["t_0"] + H)
+        self.quiet = 0.0 if resting or self.travels else self.quiet + H
+        self.levelled = self.levelled and self.quiet < p["t_v"]
         self.levelled = self.levelled or (resting and self.still * p["sample_period"] >= p["rr_s"])
 
 

@@ -3,6 +3,7 @@
     symbol  here       unit     meaning
     V       x.speed2   m2/s2    mean square of v on one axis, low-passed
     v_s     x.lasting  m/s      v, low-passed
+    f       x.fresh    1        1 at rest, fades in motion; 0 before the first rest
 
 Prediction over the block, with the sums of (2) and (3):
 
@@ -14,10 +15,10 @@ Prediction over the block, with the sums of (2) and (3):
 then measurements, one element after the other, and their results:
 
     in motion   v = 0 with variance (s_v^2 q + 2 t_v e) / H,   q = sqrt(max(V, v2^2)) / k_v    (7)
-                e = max(|v_s|^2 / 3 - 4 (s_v^2 q / (2 t_s) + tr P_v / 3), 0)                   (8)
+                e = max(|v_s|^2 / 3 - 4 (s_v^2 q / (2 t_s) + tr P_v / 3), v_0^2 f)             (8)
     at rest     v = 0 with variance rr_v^2 / H,    b = low-passed y_g with rr_g^2 / H          (9)
     R <- exp([psi]) R,   v += dv,   b += db,   D += dD,
-    t_l dV/dt = |v|^2 / 3 - V,   t_s dv_s/dt = v - v_s                                        (10)
+    t_l dV/dt = |v|^2 / 3 - V,   t_s dv_s/dt = v - v_s,   t_0 df/dt = -f in motion            (10)
 
 (5) is R' = R [w] and v' = R y_a - g e_z, true minus estimated, to first order; dD and the noise of (6) see the mean
 rate of the block, for its change within 0.05 s makes no difference to what is learnt. (7) is white velocity of density
@@ -32,6 +33,10 @@ tilt the horizon. Until the filter was at rest for rr_s it is not *levelled*, an
 rather means a wrong attitude. The same holds once it is lost, that is, knows the tilt no better than at the start
 (P0_psi): v is 0 again, its errors are independent of the others, with P0_v, and it is not levelled. A velocity known
 from wheels lasts, too, when they fall silent.
+
+A motion that has just begun may become travel. While f lasts the filter waits and sees: from the rest it knows attitude
+and bias, and a velocity taken for noise would spoil both before (8) notices that it lasts. Travel begins then or not at
+all: after t_v without rest and without a velocity beyond the noise, the filter is not levelled until the next rest.
 
 It is rest after rr_t of stillness, if the low-passed accelerometer agrees with the attitude within rr_a and three
 tilt_std: a sensor that gathers speed steadily is still, too. Before it is levelled, any stillness is rest. To an IMU
@@ -74,13 +79,15 @@ UP = ca.DM([0, 0, 1])
 PARAMETERS = (
     real("t_s", "s", 0.3, (1e-3, 1e3), "Travel: time constant of the low-passed velocity that tells it from noise"),
     real("t_v", "s", 10.0, (0, 1e4), "Travel: how long a velocity lasts; 0 takes every velocity for noise"),
+    real("v_0", "m/s", 1.0, (0, 1e3), "Travel: what velocity is expected to last in a motion that has just begun"),
+    real("t_0", "s", 1.0, (1e-3, 1e3), "Travel: time in which that expectation fades after rest"),
     real("rr_a", "m/s2", 0.3, (0, 1e3), "Rest: largest distance of the low-passed accelerometer from gravity"),
     real("rr_s", "s", 0.5, (0, 1e3), "Rest: how long it must last before the filter believes in travel"),
 )
 
-STATES = (State("lasting", (3,)), State("level"), State("levelled"), State("resting"))
+STATES = (State("lasting", (3,)), State("fresh"), State("quiet"), State("level"), State("levelled"), State("resting"))
 
-NEVER_AT_REST: Expressions = dict(lasting=ca.SX.zeros(3), level=1, levelled=0, resting=0)
+NEVER_AT_REST: Expressions = dict(lasting=ca.SX.zeros(3), fresh=0, quiet=0, level=1, levelled=0, resting=0)
 
 EMPTY: Expressions = dict(
     samples=0,
@@ -125,20 +132,24 @@ def rate(x: SimpleNamespace, u: SimpleNamespace) -> Any:
 def end_in_motion(x: SimpleNamespace, u: SimpleNamespace, p: SimpleNamespace) -> Expressions:
     """The end of a block in motion."""
     v_N, P, H = predicted_block(x, p)
-    lost = ca.logic_and(ca.logic_or(x.levelled, x.rolling), tilt_variance(P) > 2 * p.P0_psi**2)
+    known = ca.logic_or(x.levelled, x.rolling)
+    lost = ca.logic_and(known, tilt_variance(P) > 2 * p.P0_psi**2)
     v_N, P = ca.if_else(lost, 0, v_N), forgotten(P, lost, p.P0_v**2)
-    error, P = measure(ca.SX.zeros(N_ERRORS), P, V, ca.vertsplit(-v_N), density(v_N, P, x, H, p) / H)  # (7)
-    found = ca.logic_not(lost)
-    states = dict(levelled=ca.logic_and(x.levelled, found), rolling=ca.logic_and(x.rolling, found), resting=0)
+    noise, e, travels = velocity_in_motion(v_N, P, x, H, p)
+    density = noise + ca.if_else(ca.logic_and(known, ca.logic_not(lost)), 2 * p.t_v * e, 0)  # (7)
+    error, P = measure(ca.SX.zeros(N_ERRORS), P, V, ca.vertsplit(-v_N), density / H)  # (7)
+    quiet = ca.if_else(travels, 0, x.quiet + H)
+    goes_on = ca.logic_and(ca.logic_not(lost), quiet < p.t_v)
+    states = dict(levelled=ca.logic_and(x.levelled, goes_on), rolling=ca.logic_and(x.rolling, goes_on))
+    states |= dict(resting=0, quiet=quiet, fresh=x.fresh * p.t_0 / (p.t_0 + H))  # (10)
     return corrected(x, u, v_N, error, P, H, p) | states
 
 
-def density(v_N: Any, P: Any, x: SimpleNamespace, H: Any, p: SimpleNamespace) -> Any:
-    """Density ((m/s)^2/Hz) of the velocity in motion."""
+def velocity_in_motion(v_N: Any, P: Any, x: SimpleNamespace, H: Any, p: SimpleNamespace) -> tuple[Any, Any, Any]:
+    """Density ((m/s)^2/Hz) of velocity that is noise, e of one that lasts, and 1 where v is beyond the noise."""
     noise = p.s_v**2 * root(ca.if_else(x.speed2 > p.v2**2, x.speed2, p.v2**2)) / p.k_v  # (7)
-    e = ca.sumsqr(lasting(v_N, x, H, p)) / 3 - 4 * (noise / (2 * p.t_s) + ca.trace(P[V, V]) / 3)  # (8)
-    believed = ca.logic_and(ca.logic_or(x.levelled, x.rolling), e > 0)
-    return noise + ca.if_else(believed, 2 * p.t_v * e, 0)  # (7)
+    excess = ca.sumsqr(lasting(v_N, x, H, p)) / 3 - 4 * noise / (2 * p.t_s)
+    return noise, ca.fmax(excess - 4 * ca.trace(P[V, V]) / 3, x.fresh * p.v_0**2), excess > 0  # (8)
 
 
 def lasting(v_N: Any, x: SimpleNamespace, H: Any, p: SimpleNamespace) -> Any:
@@ -164,7 +175,7 @@ def end_at_rest(x: SimpleNamespace, u: SimpleNamespace, p: SimpleNamespace) -> E
     error, P = measure(ca.SX.zeros(N_ERRORS), P, V, ca.vertsplit(-v_N), variance)  # (9)
     error, P = measure(error, P, B, ca.vertsplit(x.gyro_lp - x.b), p.rr_g**2 / H)  # (9)
     levelled = ca.logic_or(x.levelled, x.still_samples * p.sample_period >= p.rr_s)
-    stands = dict(rolling=vehicle.is_valid(u), disagreed=0, levelled=levelled, resting=1)
+    stands = dict(rolling=vehicle.is_valid(u), disagreed=0, levelled=levelled, resting=1, quiet=0, fresh=1)
     return corrected(x, u, v_N, error, P, H, p) | stands
 
 
