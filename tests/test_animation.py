@@ -22,6 +22,7 @@ from imufmu.evaluate.movies import check_movie, write_movie
 from imufmu.evaluate.present import animate
 from imufmu.evaluate.systems import comparisons
 from imufmu.plants.handheld import BLOCK as HANDHELD
+from imufmu.plants.human_segment import BLOCK as HUMAN
 from imufmu.plants.pendulum import PENDULUM
 
 AIRCRAFT = np.array([[0.0, -1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])  # right, up, ahead: x ahead, z up
@@ -138,6 +139,13 @@ def test_the_window_stays_with_a_pendulum_and_holds_all_of_it() -> None:
     assert not len(scene.ground.get_xydata())
 
 
+def test_a_tall_body_that_stays_stands_above_scale_and_legend() -> None:
+    body, scene = body_of(result := result_of(HUMAN, 3.0, activity=2)), scene_of(result)
+    seen = (body.points - scene.window.middle) @ scene.views.T
+    legend = max(text.get_position()[1] for text in scene.trail.axes.texts)
+    assert seen[..., 1].min() > legend + 0.05 * scene.window.half  # the height of its letters
+
+
 def test_the_window_follows_a_traveller_over_ground_that_stays() -> None:
     result = result_of(HANDHELD, 5.0, acceleration_mean=10.0)
     body, scene = body_of(result), scene_of(result)
@@ -192,6 +200,12 @@ def test_a_gif_has_a_frame_for_each_instant_at_the_stated_rate(tmp_path: Path) -
         assert np.abs(np.asarray(picture.convert("RGB"), dtype=int) - first).max() > 100  # it moves
     assert seen[-1] == (41, 41) and len(seen) == 41
     assert [path.name for path in tmp_path.iterdir()] == ["a.gif"]
+
+
+def test_the_paper_of_a_gif_is_white_however_many_colours_its_palette_has_to_hold(tmp_path: Path) -> None:
+    animate(result_of(HUMAN, 0.1, estimators=("lee2012", "plumb")), tmp_path / "a.gif")
+    with Image.open(tmp_path / "a.gif") as picture:
+        assert np.all(np.asarray(picture.convert("RGB"))[[0, -1]] == 255)
 
 
 def test_a_long_run_says_how_much_faster_it_is_shown(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

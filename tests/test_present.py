@@ -51,6 +51,11 @@ def test_the_stick_figure_is_the_skeleton_from_the_side_at_equal_times(swing: Re
     assert axis.get_xlabel() == "horizontal, 17 deg from East towards North (m)" and axis.get_ylabel() == "up (m)"
 
 
+def test_a_plane_just_south_of_east_is_0_deg_from_it() -> None:
+    body = body_of(result_of(PENDULUM, 1.0, heading=-0.002))
+    assert stick_figure(body).axes[0].get_xlabel().startswith("horizontal, 0 deg from East")  # no -0
+
+
 def test_what_is_drawn_of_a_swing_holds_its_fastest_instant(swing: Result) -> None:
     body = body_of(swing)
     speed = np.linalg.norm(np.diff(body.points, axis=0), axis=2).max(axis=1)

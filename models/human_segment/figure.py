@@ -41,12 +41,13 @@ def main() -> None:
             across = number * 0.9 - points[:, 1] if "roller" in name else points[:, 0] + number * apart
             body.plot(across, points[:, 2], color=plt.cm.viridis(0.9 * number / len(rows)), lw=1.2)
         body.axhline(0, color="0.6", lw=0.8)
-        body.set(aspect="equal", title=f"{name}, every {times[1] - times[0]:.2g} s", ylabel="m")
+        body.set(aspect="equal", title=f"{name}, every {times[1] - times[0]:.2g} s", ylabel="up (m)")
         shown = (run.time >= times[0]) & (run.time <= times[-1])
         reading.plot(run.time[shown], run["specific_force"][shown] / GRAVITY, lw=1.0)
-        reading.set(title=f"specific force on the {SEGMENTS[parameters['segment']]}", ylabel="g")
+        reading.set(title=f"specific force on the {SEGMENTS[parameters['segment']]}", ylabel="in g")
         reading.legend(("x", "y", "z"), loc="upper right", fontsize=8)
-    axes[-1, 1].set_xlabel("s")
+    axes[-1, 0].set_xlabel("along the way, postures set apart (m)")
+    axes[-1, 1].set_xlabel("time (s)")
     figure.savefig(Path(__file__).with_name("human_segment.png"), dpi=80)
 
 

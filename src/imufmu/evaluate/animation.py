@@ -31,6 +31,7 @@ ELEVATION = np.deg2rad(15)  # of the camera
 TRAIL = 2.0  # s of the sensor's path behind it
 _SHAPE = 1.03  # height of the view of the body over its width
 _ROOM = 1.15  # of what has to fit into the window
+_FOOT = 0.08  # of the height of a body that stays: room under it for scale and legend
 _DOTS = 4  # of the ground within half of the window
 
 Progress = Callable[[int, int], None]
@@ -131,6 +132,7 @@ class Window:
         else:
             seen = body.points @ views.T
             low, high = seen.min(axis=(0, 1)), seen.max(axis=(0, 1))
+            low[1] -= _FOOT * (high - low)[1]
             self.middle = (low + high) / 2 @ views
             self.half = _ROOM * float(((high - low) / 2 / (1.0, _SHAPE)).max())
         spacing = self.half / _DOTS

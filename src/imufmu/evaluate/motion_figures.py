@@ -27,10 +27,10 @@ def stick_figure(body: Body) -> Figure:
     rows = lively(body)
     window = body.between(rows)
     views = np.array([window.side, [0.0, 0.0, 1.0]])
-    degrees = np.degrees(np.arctan2(window.side[1], window.side[0])) + 0.0
+    degrees = round(np.degrees(np.arctan2(window.side[1], window.side[0])))  # a whole number has no -0
     figure, axis = _to_scale(
         (window if body.travels else body).points @ views.T,
-        f"horizontal, {degrees:.0f} deg from East towards North (m)",
+        f"horizontal, {degrees} deg from East towards North (m)",
         "up (m)",
     )
     path = (window if body.travels else body).position @ views.T

@@ -16,6 +16,7 @@ from ..files import atomic_write
 
 GIF, MP4 = ".gif", ".mp4"
 _COLOURS = 256  # of the palette that all frames of a GIF share
+_SHADES = 8  # of a channel, of which the palette has one; Pillow looks colours up to within 4
 
 
 def check_movie(path: Path) -> None:
@@ -47,9 +48,19 @@ def _write_gif(path: Path, figure: Figure, frames: Iterable[object], rate: int) 
     for _ in frames:
         canvas.draw()
         picture = Image.fromarray(np.asarray(canvas.buffer_rgba())[..., :3])
-        palette = palette or picture.quantize(_COLOURS, Image.Quantize.MAXCOVERAGE)
+        palette = palette or _palette(picture)
         images.append(picture.quantize(palette=palette, dither=Image.Dither.NONE))
     images[0].save(path, save_all=True, append_images=images[1:], duration=1000 // rate, loop=0, optimize=False)
+
+
+def _palette(picture: Image.Image) -> Image.Image:
+    """The most frequent colours of a picture, each exact, none near another: so white paper stays white."""
+    colours, counts = np.unique(np.asarray(picture).reshape(-1, 3), axis=0, return_counts=True)
+    frequent = colours[np.argsort(-counts, kind="stable")]
+    _, first = np.unique(frequent // _SHADES, axis=0, return_index=True)
+    palette = Image.new("P", (1, 1))
+    palette.putpalette(frequent[np.sort(first)][:_COLOURS].ravel().tolist())
+    return palette
 
 
 def _write_mp4(path: Path, target: Path, figure: Figure, frames: Iterable[object], rate: int) -> None:

@@ -65,6 +65,7 @@ def _motion(body: Body) -> list[Section]:
 _ERRORS = (
     "Root mean square, largest and 95th percentile of the errors against the plant's truth, at the instants of the "
     "samples. Delay: from the instant of a sample to the row of results that first holds its outputs, in the mean; "
-    "it is no part of the errors."
+    "it is no part of the errors. The heading counts from East, which an estimator without a magnetometer cannot know: "
+    "what it does not know at the start stays in its heading error; the figure of errors counts from the start."
 )
 _BAND = "A band is the estimator's own one-sigma angle, tilt_std, where it states one."

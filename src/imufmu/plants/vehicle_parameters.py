@@ -14,7 +14,7 @@ from .vehicle_driver import HILL_START, LANE_CHANGE, OPEN
 # Air, rolling resistance, steering ratio, relaxation length and the times are chosen: usual values.
 CAR: tuple[Parameter, ...] = (
     real("mass", "kg", 1093.3, (100, 1e5), "Mass of the whole car"),
-    real("body_mass", "kg", 965.7, (50, 1e5), "Mass of the body on its springs"),
+    real("body_mass", "kg", 965.7, (50, 1e5), "Mass of the body on its springs, below that of the whole car"),
     real("front_distance", "m", 1.156, (0.3, 10), "Front axle from the centre of mass"),
     real("rear_distance", "m", 1.423, (0.3, 10), "Rear axle from the centre of mass"),
     real("track", "m", 1.375, (0.5, 5), "Left to right wheel"),
