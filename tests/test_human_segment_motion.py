@@ -180,6 +180,15 @@ def test_the_foot_that_carries_stays_near_its_place_on_the_ground(
     assert np.abs(ball[:, 2]).max() < 0.03
 
 
+@pytest.mark.parametrize("activity", [WALK, RUN], ids=["walking", "running"])
+def test_no_foot_dips_5_cm_into_the_ground_in_the_ramps_and_2_cm_in_between(activity: dict[str, Any]) -> None:
+    """The posture goes from standing to the gait and back in proportion: 37 and 41 mm as measured."""
+    run = moved(22.0, 0.005, activity)
+    lowest = run["skeleton"][..., 2].min(axis=1)
+    assert -0.05 < lowest.min() < -0.03
+    assert lowest[(run.time > 3.0) & (run.time < 19.0)].min() > -0.02
+
+
 def test_the_printed_fit_is_the_one_in_the_module() -> None:
     sys.path.insert(0, str(Path(__file__).parents[1] / "models" / "human_segment"))
     import fit_gait
@@ -233,6 +242,17 @@ def test_a_jumper_stays_on_the_ground_until_take_off_and_bends_the_knees() -> No
     knee = np.degrees(run["joint_angle"][:, 1])
     assert 40 < knee.max() < 100 and knee.min() > 5
     assert np.degrees(run["joint_angle"][:, 2]).min() > -np.degrees(TIPTOE) - 30
+
+
+@pytest.mark.parametrize(("peak", "rise"), [(40.0, 0.35), (20.0, 0.6), (10.0, 1.0)])
+def test_nobody_pushes_off_in_the_air(peak: float, rise: float) -> None:
+    """Also where the push asked for is longer than the legs: the pelvis leaves at most on the balls of the feet."""
+    run = moved(5.0, 0.002, JUMP, segment=body.PELVIS, jump_acceleration=peak, jump_height=rise)
+    height, weightless = run["position"][:, 2], length(run["specific_force"]) < 1e-9
+    release = np.sqrt(2 * GRAVITY * rise) * 0.032  # m, at most: the way in the time of release and a row
+    assert 0 < height[np.argmax(weightless)] - height[0] < 0.05 * HEIGHT + release
+    assert height.max() - height[0] == pytest.approx(rise + 0.05 * HEIGHT, rel=0.15)  # release, low heels
+    assert length(run["external_acceleration"]).max() > 0.99 * peak  # rows of 2 ms
 
 
 # Rollerblading

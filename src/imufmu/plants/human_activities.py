@@ -9,7 +9,8 @@
 Jump. z is the height of the pelvis over that of a stance with slightly bent knees, up to its highest point at t_a;
 after it the motion runs backwards, so the landing is as soft as the push-off. With the rise h in flight, the take-off
 speed v = sqrt(2 g h), the push T = 35 v / (16 a) for a peak acceleration a (35/16 is the steepest slope of S), the time
-T_r in which the ground is released, and a dip of d in the time T_d before:
+T_r in which the ground is released, and a dip of d in the time T_d before. The way of the push, v T / 2, is at most
+that of the deepest dip and the heels: legs too short for a gentle push make it shorter and harder.
 
     z = -d S(t / T_d) + v T J((t - T_d) / T) - g T_r^2 K((t - T_d - T) / T_r)          (1)
     t_a = T_d + T + T_r / 2 + v / g,   d = v T / 2 - height at take-off                (2)
@@ -80,8 +81,8 @@ def gravity(p: SimpleNamespace) -> Any:
 def jump_times(p: SimpleNamespace) -> tuple[Any, Any, Any, Any]:
     """Take-off speed v (m/s), push T (s), highest point t_a (s), dip d (m). (2)"""
     v = ca.sqrt(2 * gravity(p) * p.jump_height)
-    push = 35 / 16 * v / p.jump_acceleration
-    dip = ca.fmin(v * push / 2 - ca.fmin(HEEL_RISE * p.height, v * push / 4), DEEPEST_DIP * p.height)
+    push = ca.fmin(35 / 16 * v / p.jump_acceleration, 2 * (DEEPEST_DIP + HEEL_RISE) * p.height / v)
+    dip = v * push / 2 - ca.fmin(HEEL_RISE * p.height, v * push / 4)
     return v, push, DIP_TIME + push + RELEASE_TIME / 2 + v / gravity(p), dip
 
 

@@ -182,7 +182,9 @@ imu_position from the middle of its segment (the centre of the pelvis, the inste
 angles mount from the frame of the segment, which is x forwards, y left, z up where the person stands upright. With
 impact_acceleration a short burst of acceleration follows each contact of a foot; it is 0 at first, because bursts are
 too short for a record at 100 Hz. With wobble the sensor hangs on soft tissue, a spring and a damper. The pelvis is
-driven, not the foot: the foot that carries slides and lifts by up to 2 cm at the pace of the curves, more at others.
+driven, not the foot: the foot that carries slides and lifts by up to 2 cm at the pace of the curves, more at others;
+in the ramps a foot dips up to 5 cm into the ground. A jump that the legs are too short for at jump_acceleration is
+pushed off harder.
 Times count from 0 whatever the start time is. Arms, toes, and the deformation of the segments are left out.""",
     reference="D. A. Winter, Biomechanics and Motor Control of Human Movement, Wiley 2009 (proportions); Ottobock, The "
     "eight phases of human gait cycle, poster 400W43 (walking); chapter doi:10.4324/9780203488300-34 (running)",
