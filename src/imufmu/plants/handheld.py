@@ -30,6 +30,8 @@ The sensor. With R = R_NB and w' from the time derivative of (1),
 
     r_S = r + R l,   v_S = v + R (w x l),   a_S = r'' + R (w' x l + w x (w x l))       (3)
 
+What the sensor reads from this: module truth.
+
 To be drawn, the body is a box of the size of a telephone around the sensor.
 
 [1] Rizun, Optimal Wiener Filter for a Body Mounted Inertial Attitude Sensor, Journal of Navigation 61, 2008,

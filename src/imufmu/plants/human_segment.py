@@ -8,7 +8,7 @@
 
 Prescribed motion. The activity gives the posture at time t (modules human_gait, human_activities), the chain of
 segments the place and attitude of the sensor (human_body); R_NP turns the path frame by ``heading``. Time derivatives
-of r and q are symbolic, so the ideal IMU is exact at any step:
+of r and q are symbolic, so the ideal IMU (module truth) is exact at any step:
 
     r = R_NP (joint + q_PB (middle H + imu_position)) + (0, 0, u),   q_NS = q_NP q_PB q_BS      (1)
     w_S = 2 vec(conj(q_NS) q_NS')                                                      (2)

@@ -21,7 +21,7 @@ For one link (I + m c^2) theta'' = tau - m g c sin(theta) - b theta'.
 
 Frames: H is N turned by ``heading`` about the vertical, from East towards North; the links swing in its x-z plane and a
 positive angle moves the free end towards +x of H. L, the frame of a link, is H turned by -phi about y: its z axis
-points along the link towards the joint. S is the sensor: R_NS = Rz(heading) Ry(-phi) R_LS.
+points along the link towards the joint. S is the sensor: R_NS = Rz(heading) Ry(-phi) R_LS. What it reads: module truth.
 
 Driven motion. Both joints of a leg in walking, after the experiments in [1]: hang at rest, swing with a frequency that
 changes during the trial, hang at rest again.

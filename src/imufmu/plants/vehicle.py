@@ -8,7 +8,8 @@ The parts, each with its equations and symbols:
     vehicle_driver      manoeuvres: paths, speeds, the driver
     vehicle_parameters  the car, its road, its manoeuvres
 
-Here: the states together, what the inputs do, where the motion starts, what is reported.
+Here: the states together, what the inputs do, where the motion starts, what is reported; what the sensor reads is in
+the module truth.
 
 Inputs reach the car through its controls, so that the truth stays smooth when a host lets them jump:
 
