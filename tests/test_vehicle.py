@@ -182,11 +182,12 @@ def test_a_weave_follows_the_single_track_model_of_commonroad() -> None:
 # Forces
 
 
+@pytest.mark.parametrize("roll_axis_height", [0.0, 0.3])
 @pytest.mark.parametrize("manoeuvre", [STEP_STEER, BRAKING])
-def test_the_forces_of_the_road_are_the_momentum_of_body_and_axles(manoeuvre: int) -> None:
+def test_the_forces_of_the_road_are_the_momentum_of_body_and_axles(manoeuvre: int, roll_axis_height: float) -> None:
     """Newton for the whole car, from the ideal IMU at the body's centre of mass."""
     hard = {"step_angle": 0.5, "deceleration": 6.0, "imu_position": 0.0, "drag_area": 0.0}
-    run = drive(3.0, step=0.005, manoeuvre=manoeuvre, **hard)
+    run = drive(3.0, step=0.005, manoeuvre=manoeuvre, roll_axis_height=roll_axis_height, **hard)
     R_NS = Rotation.from_quat(np.roll(run["q_NS"], -1, axis=1))
     a_N = R_NS.apply(run["external_acceleration"])
     a_body = Rotation.from_euler("z", run["yaw"][:, None]).inv().apply(a_N)[:, :2]
