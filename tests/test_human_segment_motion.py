@@ -285,7 +285,9 @@ def test_the_outer_leg_pushes_and_both_skates_stay_near_the_ground() -> None:
         assert np.abs(bones[:, foot, 2] - 0.039 * HEIGHT).max() < 0.03
     apart = bones[:, ANKLE + LEFT, 1] - bones[:, ANKLE, 1]
     assert apart.max() > 0.4 and apart.min() > 0.1
-    assert np.mean(run["velocity"][(run.time > 4) & (run.time < 10), 0]) == pytest.approx(5.0, abs=0.05)
+    assert np.mean(run["velocity"][(run.time > 4) & (run.time < 10), 0]) == pytest.approx(
+        5.0, abs=0.02
+    )  # sway, part of a stroke
 
 
 # Sit-to-stand

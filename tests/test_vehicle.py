@@ -217,7 +217,8 @@ def test_axle_loads_carry_the_weight_and_move_with_acceleration() -> None:
     moved = (run["axle_load"][steady, 0] - static).mean()
     swing = of("body_mass") * of("body_com_height")
     topple = swing * GRAVITY * run["body_pitch"][steady].mean()
-    assert moved * L == pytest.approx(-swing * run["longitudinal_acceleration"][steady].mean() + topple, rel=0.01)
+    # The body still pitches a little.
+    assert moved * L == pytest.approx(-swing * run["longitudinal_acceleration"][steady].mean() + topple, rel=5e-3)
 
 
 def test_no_axle_ever_leaves_the_friction_circle() -> None:
@@ -275,7 +276,8 @@ def test_a_weaving_car_without_drive_only_loses_energy() -> None:
 
 def test_a_car_that_is_driven_backwards_says_so() -> None:
     run = drive(3.0, {"drive_force": -1000.0}, manoeuvre=OPEN, initial_speed=0.0)
-    assert run["forward_speed"][-1] == pytest.approx(-run["speed"][-1], rel=0.01)
+    # The undriven wheels slip by rolling resistance, f / (mu c) = 0.06 %, and inertia.
+    assert run["forward_speed"][-1] == pytest.approx(-run["speed"][-1], rel=2e-3)
     assert run["speed"][-1] > 1.5
 
 

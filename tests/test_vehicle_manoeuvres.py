@@ -62,8 +62,9 @@ def test_the_road_carries_the_car_up_and_tilts_it() -> None:
     v_N = run["velocity"][-1]
     assert np.arcsin(v_N[2] / np.linalg.norm(v_N)) == pytest.approx(grade, abs=2e-3)  # the car crabs on the bank
     # ISO 8855: nose up is negative pitch, a lower right side is positive roll; the body's springs add their part.
-    assert run["pitch"][-1] - run["body_pitch"][-1] == pytest.approx(-grade, abs=1e-3)
-    assert run["roll"][-1] - run["body_roll"][-1] == pytest.approx(bank, abs=1e-3)
+    # To the product of the slopes and the body's pitch of 1e-3 rad.
+    assert run["pitch"][-1] - run["body_pitch"][-1] == pytest.approx(-grade, abs=1e-4)
+    assert run["roll"][-1] - run["body_roll"][-1] == pytest.approx(bank, abs=1e-4)
     assert run["body_roll"][-1] > 0.005  # gravity pulls the body to the lower side
 
 
@@ -108,8 +109,8 @@ def test_the_step_of_the_steering_wheel_is_as_fast_as_the_standard_asks() -> Non
     assert first(angle, 0.9) - first(angle, 0.1) < 0.15
     # From half of the step to 90 % of the yaw rate: the linear car's mode at 80 km/h is some 7 rad/s.
     assert 0.05 < first(rate, 0.9) - first(angle, 0.5) < 0.3
-    assert run["lateral_acceleration"][-1] == pytest.approx(4.0, abs=0.5)
-    assert run["yaw_rate"][(run.time > 4)] == pytest.approx(run["yaw_rate"][-1], rel=0.01)
+    assert run["lateral_acceleration"][-1] == pytest.approx(4.0, abs=0.2)  # step_angle is a round 20 deg
+    assert run["yaw_rate"][(run.time > 4)] == pytest.approx(run["yaw_rate"][-1], rel=1e-3)  # the speed settles
 
 
 @pytest.mark.parametrize("car", CARS)
@@ -150,12 +151,12 @@ def test_the_roundabout_keeps_radius_and_speed_and_leaves() -> None:
     # Circle through the points, by least squares: x^2 + y^2 = 2 a x + 2 b y + c.
     a, b, _ = np.linalg.lstsq(np.column_stack([2 * x, 2 * y, np.ones_like(x)]), x**2 + y**2, rcond=None)[0]
     radii = np.hypot(x - a, y - b)
-    assert radii.mean() == pytest.approx(15.0, abs=0.1)
+    assert radii.mean() == pytest.approx(15.0, abs=0.1)  # the sensor is ahead of the centre of mass and leans outwards
     assert np.ptp(radii) < 0.2
     assert np.abs(run["path_error"]).max() < 0.4  # at the entry
-    assert run["speed"][laps] == pytest.approx(8.0, rel=0.02)
+    assert run["speed"][laps] == pytest.approx(8.0, rel=0.01)  # the drag of the turned wheels over 1/s
     assert run["yaw_rate"][laps].sum() * 0.05 > 2 * np.pi * 1.5
-    assert run["yaw"][-1] == pytest.approx(0.0, abs=0.01)  # whole laps: out in the direction of the entry
+    assert run["yaw"][-1] == pytest.approx(0.0, abs=1e-4)  # whole laps: out in the direction of the entry
 
 
 def test_the_driver_waits_and_then_drives_the_speed_profile() -> None:
@@ -164,7 +165,7 @@ def test_the_driver_waits_and_then_drives_the_speed_profile() -> None:
     ramp = (run.time > 5.0) & (run.time < 7.9)
     # The driver's correction of 1/s starts late by the time that brake and drive take to change over.
     assert run["speed"][ramp] == pytest.approx(2.0 * (run.time[ramp] - 3.0), abs=0.5)
-    assert run["speed"][-1] == pytest.approx(10.0, abs=0.05)
+    assert run["speed"][-1] == pytest.approx(10.0, abs=0.01)  # of 0.3 m/s, 4 s later: exp(-4)
 
 
 @pytest.mark.parametrize("car", CARS)

@@ -96,7 +96,7 @@ def test_friction_falls_with_the_load_that_a_turn_moves(roll_axis: float) -> Non
     # The springs carry the body's moment about the roll axis.
     swing = VALUES["body_mass"] * (VALUES["body_com_height"] - roll_axis)
     lean = swing * GRAVITY * run["body_roll"][-1]
-    assert springs.sum() == pytest.approx(swing * run["lateral_acceleration"][-1] + lean, rel=0.01)
+    assert springs.sum() == pytest.approx(swing * run["lateral_acceleration"][-1] + lean, rel=1e-3)  # sin(phi) for phi
 
 
 # Steering
@@ -129,7 +129,8 @@ def test_drive_at_steered_wheels_pulls_the_car_into_the_turn() -> None:
     rate = np.gradient(run["yaw_rate"], run.time)
     assert np.abs(np.sin(delta) * front_x).max() > 500
     middle = slice(5, -5)  # one-sided differences at the ends
-    assert rate[middle] * VALUES["yaw_inertia"] == pytest.approx(moment[middle], abs=0.01 * np.abs(moment).max())
+    # Differences of 2 ms of a motion that changes within 0.1 s.
+    assert rate[middle] * VALUES["yaw_inertia"] == pytest.approx(moment[middle], abs=2e-3 * np.abs(moment).max())
 
 
 # Road and body

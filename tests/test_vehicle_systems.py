@@ -117,6 +117,6 @@ def test_the_figure_of_the_readme_is_drawn_by_its_command(tmp_path: Path) -> Non
 
 def test_the_braking_car_comes_to_rest() -> None:
     result = result_of("vehicle_braking")
-    assert result["plant.speed"].max() == pytest.approx(80 / 3.6, rel=0.01)
+    assert result["plant.speed"].max() == pytest.approx(80 / 3.6, rel=0.01)  # the driver overshoots
     assert result["plant.speed"][-1] < 1e-4
-    assert result["plant.longitudinal_acceleration"].min() == pytest.approx(-6.0, abs=0.2)
+    assert result["plant.longitudinal_acceleration"].min() == pytest.approx(-6.0, abs=0.1)  # air, turning wheels
