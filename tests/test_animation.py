@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from drawn_runs import result_of
 from matplotlib import rc_context
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from PIL import Image
 
@@ -164,7 +165,7 @@ def test_many_estimators_have_an_instrument_each_that_none_hides() -> None:
     estimate = {name: values for name, values in result.columns.items() if name.startswith("lee2012.")}
     columns = dict(result.columns)
     for i in range(7):
-        columns |= {name.replace("lee2012", f"filter{i}"): values for name, values in estimate.items()}
+        columns |= {name.replace("lee2012", f"zihajehzadeh201{i}"): values for name, values in estimate.items()}
     scene = scene_of(Result("many", result.time, columns, result.units))
     scene.show(0.1)
     places = [instrument.line.axes.get_position() for instrument in scene.instruments]
@@ -174,6 +175,10 @@ def test_many_estimators_have_an_instrument_each_that_none_hides() -> None:
         across = min(one.x1, other.x1) - max(one.x0, other.x0)
         along = min(one.y1, other.y1) - max(one.y0, other.y0)
         assert min(across, along) < 1e-9  # beside or below each other
+    FigureCanvasAgg(scene.figure).draw()
+    view = scene.trail.axes.get_window_extent()
+    names = [instrument.line.axes.title.get_window_extent() for instrument in scene.instruments]
+    assert not any(one.overlaps(other) for one, other in itertools.combinations([view, *names], 2))
 
 
 # The files

@@ -62,7 +62,7 @@ class Instrument:
         self.truth = axis.plot([], [], "--", color=TRUTH_COLOUR, linewidth=1.0)[0]
         axis.plot([-0.45, -0.15, 0, 0.15, 0.45], [0, 0, -0.12, 0, 0], color=MARK, linewidth=2.5)
         axis.add_patch(Circle((0, 0), 1, facecolor="none", edgecolor=colour, linewidth=2.5))
-        axis.set_title(compared.component, fontsize=10, color=colour, pad=1)
+        axis.set_title(compared.component, fontsize=font_size, color=colour, pad=1)
         self.text = axis.text(0, -1.1, "", fontsize=font_size, color=TRUTH_COLOUR, ha="center", va="top")
 
     def show(self, row: int) -> None:
