@@ -91,6 +91,18 @@ def test_an_error_of_the_fmu_is_a_finding(changed):
     assert "one step" in problems(changed({"resources/lee2012_fmu.py": script}))
 
 
+@pytest.mark.parametrize(("code", "expected"), [(0, "before the step was done"), (3, "with exit code 3")])
+def test_an_fmu_that_ends_its_process_instead_of_a_step_is_found(code, expected, changed):
+    """No crash, and with code 0 no sign of a fault but the step that is missing."""
+    script = f"import os\nfrom pythonfmu import Fmi2Slave\nclass Lee2012(Fmi2Slave):\n    pass\nos._exit({code})\n"
+    found = problems(changed({"resources/lee2012_fmu.py": script.encode()}))
+    assert found["one step"] == f"it ended its process {expected}."
+
+
+def test_the_trial_takes_a_step_where_the_default_step_is_zero(changed):
+    assert "one step" not in problems(changed(xml=('stepSize="0.01"', 'stepSize="0"')))
+
+
 def test_missing_packages_and_broken_python_are_found(changed):
     missing = problems(changed({"resources/lee2012_fmu.py": b"import no_such_package\n"}))
     assert "not installed here: no_such_package" in missing["Python"]
@@ -101,8 +113,9 @@ def test_missing_packages_and_broken_python_are_found(changed):
 def test_a_platform_without_its_library_is_found(changed):
     found = problems(changed({"binaries/win64/lee2012.dll": b"", "binaries/linux64/lee2012.so": None}))
     assert "not tried: no binary for this machine" in found["one step"]
-    renamed = problems(changed(xml=('modelIdentifier="lee2012"', 'modelIdentifier="other"')))
-    assert "other" in renamed["binaries"] and "is missing" in renamed["binaries"]
+    renamed = examine(changed(xml=('modelIdentifier="lee2012"', 'modelIdentifier="other"')))
+    assert all("other" in f.text and "is missing" in f.text for f in renamed if f.topic == "binaries")
+    assert next(f.text for f in renamed if f.topic == "Simulink").startswith("nowhere")
 
 
 @pytest.mark.parametrize(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import ast
 import importlib.util
 import sys
-from collections.abc import Iterable, Iterator
+from collections.abc import Collection, Container, Iterator
 from dataclasses import dataclass
 from enum import Enum
 from pathlib import Path, PurePosixPath
@@ -72,7 +72,8 @@ def examine(path: Path) -> list[Finding]:
     findings = [*_standard(path, model), *_bounds(model), *_binaries(names, platforms, model)]
     if is_python:
         findings.append(_python_packages(path))
-    findings += _hosts(platforms, model, is_python)
+    complete = [platform for platform in platforms if not _missing_library(platform, names, model)]
+    findings += _hosts(complete, model, is_python)
     findings.append(_trial(path, platforms, model))
     return findings
 
@@ -111,20 +112,25 @@ def _bounds(model: Any) -> Iterator[Finding]:
         yield Finding(Level.PROBLEM, "bounds", fault)
 
 
-def _binaries(names: Iterable[str], platforms: list[str], model: Any) -> Iterator[Finding]:
-    identifiers = {part.modelIdentifier for part in (model.coSimulation, model.modelExchange) if part}
+def _binaries(names: Collection[str], platforms: list[str], model: Any) -> Iterator[Finding]:
     if not platforms:
         has_sources = any(name.startswith("sources/") for name in names)
         remedy = "compile it from its sources with `fmpy compile`" if has_sources else "export it with binaries"
         yield Finding(Level.PROBLEM, "binaries", f"there are none; {remedy}")
     for platform in platforms:
-        suffix = next((s for system, s in _SYSTEMS.items() if system in platform), "")
-        missing = [i for i in identifiers if f"binaries/{platform}/{i}{suffix}" not in set(names)]
+        missing = _missing_library(platform, names, model)
         title = f"{platform} ({_PLATFORMS.get(platform, 'a platform without a name here')})"
-        if missing and suffix:
-            yield Finding(Level.PROBLEM, "binaries", f"{title}: {missing[0]}{suffix} is missing")
+        if missing:
+            yield Finding(Level.PROBLEM, "binaries", f"{title}: {missing} is missing")
         else:
             yield Finding(Level.GOOD, "binaries", title)
+
+
+def _missing_library(platform: str, names: Container[str], model: Any) -> str:
+    """A library that should be in the platform's folder and is not; empty if all are, or if its suffix is unknown."""
+    suffix = next((s for system, s in _SYSTEMS.items() if system in platform), "")
+    wanted = [f"{part.modelIdentifier}{suffix}" for part in (model.coSimulation, model.modelExchange) if part]
+    return next((file for file in wanted if suffix and f"binaries/{platform}/{file}" not in names), "")
 
 
 def _python_packages(path: Path) -> Finding:
@@ -181,7 +187,7 @@ def _trial(path: Path, platforms: list[str], model: Any) -> Finding:
         return Finding(Level.NOTE, "one step", f"works on this machine in one of two tries; in the other {trial.fault}")
     said = f" It said: {' | '.join(trial.said.splitlines()[-3:])}" if trial.said else ""
     if trial.fault:
-        return Finding(Level.PROBLEM, "one step", f"{trial.fault}.{said}")
+        return Finding(Level.PROBLEM, "one step", f"{trial.fault.rstrip('.')}.{said}")
     if trial.closing:
         return Finding(Level.NOTE, "one step", f"works on this machine, but when closed {trial.closing}.{said}")
     return Finding(Level.GOOD, "one step", f"works on this machine.{said}")

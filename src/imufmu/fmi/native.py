@@ -137,7 +137,8 @@ def _library(name: str, code: dict[str, bytes], platform: Platform) -> bytes:
     if not kept.is_file():
         (folder / "sources").mkdir(parents=True, exist_ok=True)
         for source, content in code.items():
-            (folder / "sources" / source).write_bytes(content)
+            with atomic_write(folder / "sources" / source) as temporary:  # another process may compile them now
+                temporary.write_bytes(content)
         with tempfile.TemporaryDirectory(prefix="imufmu_build_") as scratch:
             made = Path(scratch) / file
             compile_library(calls, folder / "sources" / NATIVE_SOURCE, made)

@@ -42,8 +42,10 @@ def try_step(fmu: Path) -> Trial:
         crash = f"it crashed its process ({signal.Signals(-done.returncode).name})"
         return Trial("", said, crash) if _STEPPED in printed else Trial(crash, said)
     if done.returncode:
-        lines = said.splitlines() or [f"exit code {done.returncode}"]
+        lines = said.splitlines() or [f"it ended its process with exit code {done.returncode}"]
         return Trial(lines[-1], "\n".join(lines[:-1]))
+    if _STEPPED not in printed:  # an FMU that calls exit(0) takes no step
+        return Trial("it ended its process before the step was done", said)
     return Trial("", said)
 
 
@@ -52,11 +54,12 @@ def main() -> None:
     path = sys.argv[1]
     experiment = fmpy.read_model_description(path, validate=False).defaultExperiment
     start = float(experiment.startTime or 0.0) if experiment else 0.0
-    step = float(experiment.stepSize or 0.01) if experiment else 0.01
+    step = float(experiment.stepSize or 0.0) if experiment else 0.0
+    step = step if step > 0 else 0.01
 
     def stepped(time: float, _recorder: object) -> bool:
         if time > start:
-            print(_STEPPED, flush=True)
+            print(f"\n{_STEPPED}", flush=True)  # on a line of its own, whatever the FMU printed before
         return True
 
     try:
