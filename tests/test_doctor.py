@@ -8,10 +8,12 @@ from pathlib import Path
 
 import pytest
 
+from imufmu.fmi import doctor
 from imufmu.fmi.build import cached_fmu
 from imufmu.fmi.compilers import PLATFORMS
 from imufmu.fmi.doctor import Level, examine
 from imufmu.fmi.native import cached_native_fmu
+from imufmu.fmi.trial import HUNG, Trial
 from imufmu.registry import BLOCKS
 
 
@@ -97,6 +99,12 @@ def test_an_fmu_that_ends_its_process_instead_of_a_step_is_found(code, expected,
     script = f"import os\nfrom pythonfmu import Fmi2Slave\nclass Lee2012(Fmi2Slave):\n    pass\nos._exit({code})\n"
     found = problems(changed({"resources/lee2012_fmu.py": script.encode()}))
     assert found["one step"] == f"it ended its process {expected}."
+
+
+def test_an_fmu_that_does_not_come_back_is_tried_once(changed, monkeypatch):
+    trials = iter([Trial(HUNG, "")])
+    monkeypatch.setattr(doctor, "try_step", lambda path: next(trials))
+    assert problems(changed())["one step"] == "it did not finish one step within 60 s."
 
 
 def test_the_trial_takes_a_step_where_the_default_step_is_zero(changed):

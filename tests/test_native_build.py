@@ -169,6 +169,9 @@ def test_without_a_compiler_the_message_says_what_to_install(tmp_path: Path, mon
     for build in (lambda: build_native("lee2012", tmp_path), lambda: cached_native_fmu("lee2012")):
         with pytest.raises(BuildError, match=r"'no-such-compiler' is not installed.*pip install imufmu\[native\]"):
             build()
+    monkeypatch.setenv("CC", '"cc')
+    with pytest.raises(BuildError, match="variable CC is '\"cc', which is no command"):
+        build_native("lee2012", tmp_path)
     other = next(platform for platform in PLATFORMS if platform != own_platform())
     with pytest.raises(BuildError, match=rf"{other} needs .*ziglang"):
         build_native("lee2012", tmp_path, [other])
@@ -186,6 +189,15 @@ def test_unknown_or_unfit_blocks_platforms_and_closed_folders_are_refused_by_nam
     (tmp_path / "file").write_text("")
     with pytest.raises(BuildError, match=r"cannot write .*file"):
         build_native("lee2012", tmp_path / "file")
+
+
+def test_a_cache_that_cannot_be_written_is_named_and_not_the_target(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "file").write_text("")
+    monkeypatch.setattr(native, "user_cache_path", lambda name: tmp_path / "file")
+    with pytest.raises(BuildError, match=r"cannot write .*file.native"):
+        build_native("lee2012", tmp_path / "out")
 
 
 def test_a_universal_library_holds_each_library_where_its_table_says() -> None:

@@ -46,7 +46,7 @@ def build_fmu(name: str, folder: Path) -> Path:
             with atomic_write(target) as temporary:
                 _repack(built, name, temporary)
     except OSError as error:
-        raise BuildError(f"cannot write {target}: {error.strerror or error}") from error
+        raise BuildError(f"cannot write {error.filename or target}: {error.strerror or error}") from error
     return target
 
 

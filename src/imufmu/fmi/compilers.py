@@ -111,7 +111,10 @@ def identity() -> str:
 def _system_compiler() -> list[str]:
     """The command in the variable CC, or cc. Raises BuildError if there is none."""
     wanted = os.environ.get("CC", "cc")
-    compiler = shlex.split(wanted)
+    try:
+        compiler = shlex.split(wanted)
+    except ValueError as error:
+        raise BuildError(f"the variable CC is {wanted!r}, which is no command: {error}") from error
     if not compiler or not shutil.which(compiler[0]):
         raise BuildError(f"no C compiler: {wanted!r} is not installed, nor is ziglang. pip install imufmu[native]")
     return compiler

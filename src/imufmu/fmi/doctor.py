@@ -15,7 +15,7 @@ import fmpy
 from fmpy.validation import validate_fmu
 
 from ..archives import ArchiveError, fmu_members, read_members
-from .trial import try_step
+from .trial import HUNG, try_step
 
 _SYSTEMS = {"linux": ".so", "darwin": ".dylib", "win": ".dll"}  # the name darwin has a win in it
 _PLATFORMS = {
@@ -183,7 +183,8 @@ def _trial(path: Path, platforms: list[str], model: Any) -> Finding:
     if not {fmpy.platform, fmpy.platform_tuple} & set(platforms):
         return Finding(Level.PROBLEM, "one step", f"not tried: no binary for this machine ({fmpy.platform})")
     trial = try_step(path)
-    if trial.fault and not try_step(path).fault:  # a crash by chance and one by design are different news
+    # A crash by chance and one by design are different news; an endless loop is not worth another minute.
+    if trial.fault and trial.fault != HUNG and not try_step(path).fault:
         return Finding(Level.NOTE, "one step", f"works on this machine in one of two tries; in the other {trial.fault}")
     said = f" It said: {' | '.join(trial.said.splitlines()[-3:])}" if trial.said else ""
     if trial.fault:

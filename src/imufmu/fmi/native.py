@@ -56,7 +56,7 @@ def build_native(
         with atomic_write(target) as temporary:
             write_archive(_members(block, code, wanted) | binaries, temporary)
     except OSError as error:
-        raise BuildError(f"cannot write {target}: {error.strerror or error}") from error
+        raise BuildError(f"cannot write {error.filename or target}: {error.strerror or error}") from error
     return target
 
 

@@ -14,6 +14,7 @@ from pathlib import Path
 import fmpy
 
 _SECONDS = 60.0
+HUNG = f"it did not finish one step within {_SECONDS:g} s"
 _STEPPED = "imufmu: step taken"  # the process prints it; what follows is the end of the FMU
 
 
@@ -35,7 +36,7 @@ def try_step(fmu: Path) -> Trial:
     try:
         done = subprocess.run(command, capture_output=True, text=True, errors="replace", timeout=_SECONDS)
     except subprocess.TimeoutExpired:
-        return Trial(f"it did not finish one step within {_SECONDS:g} s", "")
+        return Trial(HUNG, "")
     printed = (done.stdout + done.stderr).splitlines()
     said = "\n".join(line for line in printed if line.strip() and line != _STEPPED)
     if done.returncode < 0:
