@@ -144,7 +144,7 @@ class Series(SampledBlock):
             return block.first_function(inputs, parameters, self._draws(block, w))
 
         x, y = self._chain(u, p, first)
-        return ca.Function(f"{self.name}_first", [u, p, w], [ca.vertcat(*x, 1, u), y], ["u", "p", "w"], ["x", "y"])
+        return ca.Function(f"{self.name}_first", [u, p, w], [ca.densify(ca.vertcat(*x, 1, u)), y], ["u", "p", "w"], ["x", "y"])
 
     @cached_property
     def next_function(self) -> Any:
@@ -167,7 +167,7 @@ class Series(SampledBlock):
             return block.next_function(x, inputs, parameters, self._draws(block, w))
 
         x, y = self._chain(u, p, following)
-        result = [ca.vertcat(*x, samples + 1, u), y]
+        result = [ca.densify(ca.vertcat(*x, samples + 1, u)), y]
         return ca.Function(f"{self.name}_next", [x_all, u, p, w], result, ["x", "u", "p", "w"], ["x_next", "y"])
 
     def _mx_arguments(self) -> tuple[Any, Any, Any]:
