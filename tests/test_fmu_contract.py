@@ -78,6 +78,7 @@ def test_an_impossible_step_is_refused_and_changes_nothing(kind, t, h):
 def test_a_step_in_which_the_solver_diverges_is_refused_and_changes_nothing(kind):
     """Damping of 1e4 N.m.s/rad is far outside the stability of RK4 at 1 s, and within it at 0.1 ms."""
     stiff = {"max_step": 1.0, "damping[1]": 1e4, "initial_rate[1]": 1.0}
+    stiff |= {"disturbances": 1, "disturbance_stop[1]": 2000.0, "disturbance_field[1]": 20.0}  # shows the time
     tried, spared = (fmu.Fmu("pendulum", kind=kind).initialise(stiff) for _ in range(2))
     for instance in (tried, spared):
         instance.step(0.0, 1e-4)
@@ -90,6 +91,20 @@ def test_a_step_in_which_the_solver_diverges_is_refused_and_changes_nothing(kind
     assert tried.reals() == spared.reals()
     tried.close()
     spared.close()
+
+
+def test_samples_and_the_motion_of_a_plant_count_from_the_start_time(kind):
+    """The step from 4.99 to 5.06 holds six instants of lee2012: 5.00 to 5.05."""
+    estimator = fmu.Fmu("lee2012", kind=kind).initialise(start_time=5.0)
+    assert estimator.get("sample_time") == [5.0]
+    estimator.step(4.99, 0.07)
+    assert estimator.get("sample_time") == [5.05]
+    estimator.close()
+    disturbed = {"disturbances": 1, "disturbance_stop[1]": 10.0, "disturbance_field[1]": 20.0}
+    early, late = (fmu.Fmu("pendulum", kind=kind).initialise(disturbed, start_time=t) for t in (0.0, 5.0))
+    assert early.get("magnetic_field[1]") != late.get("magnetic_field[1]")
+    early.close()
+    late.close()
 
 
 @pytest.mark.parametrize("block", [b.name for b in ESTIMATORS])

@@ -106,6 +106,21 @@ def test_a_wrong_parameter_can_be_corrected_before_initialisation_ends() -> None
     instance.close()
 
 
+def test_during_initialisation_the_outputs_follow_parameters_of_every_type() -> None:
+    """Set one by one, the outputs read between."""
+    tilted = {"initial_roll": 0.5, "use_initial_angles": 1.0}
+    for name, parameters in {"lee2012": tilted, "imu": {"gyro_noise_density": 0.1, "seed": 7}}.items():
+        instance, expected = native(name), native(name).initialise(parameters)
+        enter(instance)
+        outputs = [v.name for v in instance.model.modelVariables if v.causality == "output"]
+        for parameter, value in parameters.items():
+            before = instance.get(*outputs)
+            instance.set({parameter: value})
+        assert instance.get(*outputs) == expected.get(*outputs) != before, name
+        instance.slave.freeInstance()
+        expected.close()
+
+
 def test_every_wrong_parameter_is_named_in_one_message() -> None:
     instance = native()
     message = refusal(instance, lambda: instance.initialise({"c_a": math.nan, "mode": 4, "P0": -1.0}))
@@ -232,6 +247,18 @@ def test_a_state_of_another_block_or_length_is_refused_and_changes_nothing() -> 
     other.close()
 
 
+def test_a_state_is_not_written_into_less_room_than_it_needs() -> None:
+    instance = native().initialise()
+    state = instance.slave.getFMUstate()
+    room = (ctypes.c_char * len(fmu.serialised(instance)))()
+    refusal(
+        instance, lambda: instance.slave.fmi2SerializeFMUstate(instance.slave.component, state, room, len(room) - 1)
+    )
+    assert bytes(room) == bytes(len(room))
+    instance.slave.freeFMUstate(state)
+    instance.close()
+
+
 @pytest.mark.parametrize("name", NAMES)
 def test_a_state_kept_in_memory_returns_bit_for_bit_also_to_another_phase(name: str) -> None:
     instance = native(name)
@@ -296,6 +323,17 @@ def test_directional_derivatives_are_those_of_repeating_the_last_step_with_other
     # A first sample may depend on parameters alone; a car feels its controls by their lags only.
     assert steps < 2 or name == "vehicle" or np.any(actual != 0)
     instance.slave.freeInstance()
+
+
+def test_the_derivative_of_a_sampled_block_is_at_the_inputs_of_its_last_sample() -> None:
+    instance = native().initialise()
+    for k in range(3):
+        instance.set({"gyro[1]": 0.3, "accel[2]": 2.0})
+        instance.step(0.01 * k, 0.01)
+    before = derivative(instance, "roll", "accel[3]")
+    instance.set({"gyro[1]": -5.0, "accel[2]": -8.0})  # for the next sample
+    assert derivative(instance, "roll", "accel[3]") == before != 0
+    instance.close()
 
 
 def test_derivatives_are_of_outputs_with_respect_to_inputs_only() -> None:
