@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import math
+import struct
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
@@ -239,8 +240,10 @@ def test_a_state_of_another_block_or_length_is_refused_and_changes_nothing() -> 
     own = fmu.serialised(instance)
     wrong_phase = own.replace((4).to_bytes(8, "little"), (77).to_bytes(8, "little"))
     other_build = own.replace(instance.model.guid.encode(), guid(BLOCKS["imu"], native=True).encode())
+    mode = 40 + 8 * instance.variables["mode"].valueReference  # behind the GUID, doubles by value reference
+    no_integer = own[:mode] + struct.pack("<d", 1e300) + own[mode + 8 :]
     assert own not in (wrong_phase, other_build)
-    for saved in (foreign, own[:-8], own + b"\0", other_build, wrong_phase):
+    for saved in (foreign, own[:-8], own + b"\0", other_build, wrong_phase, no_integer):
         refusal(instance, lambda saved=saved: fmu.restore(instance, saved))
         assert instance.reals() == before
     instance.close()

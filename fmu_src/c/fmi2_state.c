@@ -20,6 +20,10 @@ fmi2Status fmi2GetFMUstate(fmi2Component component, fmi2FMUstate *kept) {
 /* Whether a snapshot is one of this block. Bytes that the host kept may be anything. */
 static bool is_ours(const Snapshot *snapshot) {
     if (memcmp(snapshot->guid, MODEL_GUID, sizeof MODEL_GUID) != 0) return false;
+    for (int i = 0; i < N_VARIABLES; i++) {
+        double value = snapshot->state.values[i];
+        if (VARIABLES[i].type != REAL && !(INT32_MIN <= value && value <= INT32_MAX)) return false;
+    }
     switch (snapshot->state.phase) {
         case INSTANTIATED:
         case INITIALISING:

@@ -13,7 +13,7 @@ static uint64_t mix(uint64_t z) {
 static void draw(Instance *c, int64_t k) {
     double *next = c->draws;
     for (const Stream *stream = STREAMS; stream->draws > 0; stream++) {
-        uint64_t start = mix((uint64_t)c->state.values[stream->seed] + STRIDE);
+        uint64_t start = mix((uint64_t)(int64_t)c->state.values[stream->seed] + STRIDE);
         for (int j = 0; j < stream->draws; j++) {
             uint64_t index = (uint64_t)k * (uint64_t)stream->draws + (uint64_t)j;
             uint64_t z = mix(start + (index + 1) * STRIDE);
