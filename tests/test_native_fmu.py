@@ -173,6 +173,18 @@ def test_what_is_not_there_is_refused_and_says_so() -> None:
 # Logging
 
 
+@pytest.mark.parametrize("callbacks", [None, fmi2.fmi2CallbackFunctions()], ids=["none", "no logger"])
+def test_a_host_without_callbacks_is_served_in_silence(callbacks: fmi2.fmi2CallbackFunctions | None) -> None:
+    instance = native()
+    library, identity = instance.slave.dll, instance.model.guid.encode()
+    given = None if callbacks is None else ctypes.byref(callbacks)
+    assert library.fmi2Instantiate(b"quiet", fmi2.fmi2CoSimulation, b"wrong", None, given, 0, 1) is None
+    component = library.fmi2Instantiate(b"quiet", fmi2.fmi2CoSimulation, identity, None, given, 0, 1)
+    assert library.fmi2DoStep(component, 0.0, 0.01, 1) == ERROR
+    library.fmi2FreeInstance(component)
+    instance.slave.freeInstance()
+
+
 def test_logging_off_leaves_the_refusals() -> None:
     instance = native(logging=False).initialise()
     instance.set({"gyro[1]": math.nan})
