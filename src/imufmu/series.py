@@ -144,7 +144,9 @@ class Series(SampledBlock):
             return block.first_function(inputs, parameters, self._draws(block, w))
 
         x, y = self._chain(u, p, first)
-        return ca.Function(f"{self.name}_first", [u, p, w], [ca.densify(ca.vertcat(*x, 1, u)), y], ["u", "p", "w"], ["x", "y"])
+        return ca.Function(
+            f"{self.name}_first", [u, p, w], [ca.densify(ca.vertcat(*x, 1, u)), y], ["u", "p", "w"], ["x", "y"]
+        )
 
     @cached_property
     def next_function(self) -> Any:
