@@ -39,18 +39,19 @@ def signal_rows(signals: tuple[Signal, ...]) -> list[dict[str, str]]:
 
 
 def equations(block: Block) -> str:
-    """The module docstring of the block: its equations, symbols and source; then those of the parts that it names.
+    """The module docstring of the block: its equations, symbols and source; then those of the modules it names.
 
-    A part of the module ``plumb`` is a module ``plumb_...`` beside it.
+    A name with an underscore, or behind the word "module", is one where such a module of the same package is loaded.
     """
     module = inspect.getmodule(block.output)
     if module is None:
         return ""
+    package, _, own = module.__name__.rpartition(".")
     text = inspect.cleandoc(module.__doc__ or "")
-    package, _, name = module.__name__.rpartition(".")
-    parts = dict.fromkeys(re.findall(rf"\b{name}_\w+", text))
-    modules = {part: sys.modules[f"{package}.{part}"] for part in parts if f"{package}.{part}" in sys.modules}
-    return "\n\n\n".join([text, *(f"{p}\n\n{inspect.cleandoc(m.__doc__ or '')}" for p, m in modules.items())])
+    names = dict.fromkeys(re.findall(r"\b[a-z]\w*_\w+|(?<=\bmodule )[a-z]\w*", text))
+    parts = [name for name in names if name != own and f"{package}.{name}" in sys.modules]
+    docs = {name: inspect.cleandoc(sys.modules[f"{package}.{name}"].__doc__ or "") for name in parts}
+    return "\n\n\n".join([text, *(f"{name}\n\n{doc}" for name, doc in docs.items())])
 
 
 def documentation_page(block: Block, platforms: Sequence[str] = ()) -> str:
