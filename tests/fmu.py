@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tempfile
 from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from pathlib import Path
@@ -15,6 +16,8 @@ from imufmu.fmi.build import cached_fmu
 from imufmu.fmi.native import cached_native_fmu
 
 KINDS = ("python", "native")
+
+_FOLDER = tempfile.TemporaryDirectory(prefix="imufmu_tests_", ignore_cleanup_errors=True)  # gone with the process
 
 
 def path(name: str, kind: str = "python") -> Path:
@@ -31,7 +34,7 @@ def description(name: str, kind: str = "python") -> Any:
 @lru_cache
 def unpacked(name: str, kind: str = "python") -> str:
     """Folder of the unpacked FMU, for the whole test run."""
-    return str(fmpy.extract(str(path(name, kind))))
+    return str(fmpy.extract(str(path(name, kind)), tempfile.mkdtemp(dir=_FOLDER.name)))
 
 
 class Fmu:

@@ -13,10 +13,10 @@ SYSTEMS = sorted(path.stem for path in (models_folder() / "human_segment").glob(
 # Largest tilt error RMS, deg, of lee2012 and plumb, half again of what came out (models/human_segment/README.md), and
 # the smallest of the direction that the accelerometer reads.
 LIMITS = {
-    "human_walking_thigh": (3.0, 3.0, 10.0),
-    "human_running_foot": (7.0, 7.5, 40.0),
+    "human_walking_thigh": (3.0, 2.1, 10.0),
+    "human_running_foot": (7.0, 5.8, 40.0),
     "human_jump": (0.2, 0.2, 20.0),
-    "human_rollerblading": (6.7, 9.0, 5.0),
+    "human_rollerblading": (6.7, 6.6, 5.0),
 }
 
 

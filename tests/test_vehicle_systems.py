@@ -56,11 +56,12 @@ def test_every_estimator_reads_the_same_imu_and_only_plumb_the_wheels(system: st
         assert ("forward_speed" in fed) == (estimator == "plumb")
 
 
+@pytest.mark.parametrize("readme", ["README.md", "models/vehicle/README.md"])
 @pytest.mark.parametrize("system", SYSTEMS)
-def test_the_readme_tells_the_tilt_errors_that_come_out(system: str) -> None:
+def test_the_readmes_tell_the_tilt_errors_that_come_out(system: str, readme: str) -> None:
     """To the digits given: one seed, so that only rounding may differ."""
-    readme = (models_folder() / "vehicle" / "README.md").read_text(encoding="utf-8")
-    (row,) = re.findall(rf"^\| `{system}` \|(.*)\|$", readme, re.MULTILINE)
+    text = (models_folder().parent / readme).read_text(encoding="utf-8")
+    (row,) = re.findall(rf"^\| `{system}` \|(.*)\|$", text, re.MULTILINE)
     found = tilt_rmse_deg(system)
     expected = [found[name] for name in (*WITHOUT_WHEELS, "plumb")]
     assert [float(cell) for cell in row.split("|")] == pytest.approx(expected, abs=0.006)

@@ -173,8 +173,9 @@ Magnetometer: mag turns yaw to North and changes nothing else, not by a bit; its
 field is left out (status 16). Without mag (all zero, or not connected) yaw counts from the start and drifts.
 Do not use it without forward_speed where velocity changes for minutes on end - an aircraft in a turn, a centrifuge -
 nor where it starts in the middle of such a motion: there velocity is no noise, and the horizon tilts. Do not use it
-on a turntable: a turn slower than rr_b that lasts longer than rr_t is taken for rest, and its rate for bias. A
-saturated accelerometer is not noticed.""",
+on a turntable: a turn slower than rr_b that lasts longer than rr_t is taken for rest, and its rate for bias. So is an
+acceleration that sets in gently and free of any turn, as in a lift or a train: it becomes tilt. A saturated
+accelerometer is not noticed.""",
     reference="Model of velocity: T. Rizun, Journal of Navigation 61, 2008, doi:10.1017/S0373463308004736",
     inputs=(v.GYRO, v.ACCEL, v.MAG, *vehicle.INPUTS),
     outputs=(
