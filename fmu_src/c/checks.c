@@ -80,3 +80,21 @@ static bool is_settable(Instance *c, fmi2ValueReference reference, Type type, do
            kept);
     return false;
 }
+
+/* What is set and read at every step needs no look at the table, whose rows are wide: the value reference of an input or
+   of a result tells by itself that the variable is Real, and an input takes any value at any time. */
+
+static bool are_inputs(const fmi2ValueReference vr[], size_t n) {
+    for (size_t i = 0; i < n; i++) {
+        if (vr[i] >= N_INPUTS) return false;
+    }
+    return true;
+}
+
+/* Whether all are outputs or locals. */
+static bool are_results(const fmi2ValueReference vr[], size_t n) {
+    for (size_t i = 0; i < n; i++) {
+        if (vr[i] < N_INPUTS + N_PARAMETERS || vr[i] >= N_VARIABLES) return false;
+    }
+    return true;
+}

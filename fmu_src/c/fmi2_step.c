@@ -23,7 +23,7 @@ fmi2Status fmi2DoStep(fmi2Component component, fmi2Real t, fmi2Real h, fmi2Boole
     if (!(isfinite(t) && isfinite(h) && h > 0)) {
         return refuse(c, "cannot step from t = %.15g s by h = %.15g s; h must be positive and finite", t, h);
     }
-    if (h / c->state.values[PERIOD] > LONGEST_STEP) {
+    if (h > LONGEST_STEP * c->state.values[PERIOD]) {
         return refuse(c, "a step of h = %.15g s is more than %g internal steps", h, LONGEST_STEP);
     }
     fmi2Status status = engine_step(c, t, h);

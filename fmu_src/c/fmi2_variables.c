@@ -15,8 +15,10 @@ static bool are_readable(Instance *c, const char *function, const fmi2ValueRefer
                          const void *values) {
     if (!in_phase(c, function, READABLE)) return false;
     if (!is_given(c, function, vr, n) || !is_given(c, function, values, n)) return false;
-    for (size_t i = 0; i < n; i++) {
-        if (!find(c, vr[i], type)) return false;
+    if (type != REAL || !are_results(vr, n)) {
+        for (size_t i = 0; i < n; i++) {
+            if (!find(c, vr[i], type)) return false;
+        }
     }
     bring_up_to_date(c);
     return true;
@@ -59,8 +61,10 @@ static bool are_writable(Instance *c, const char *function, const fmi2ValueRefer
 fmi2Status fmi2SetReal(fmi2Component component, const fmi2ValueReference vr[], size_t n, const fmi2Real value[]) {
     Instance *c = component;
     if (!are_writable(c, "fmi2SetReal", vr, n, value)) return fmi2Error;
-    for (size_t i = 0; i < n; i++) {
-        if (!is_settable(c, vr[i], REAL, value[i])) return fmi2Error;
+    if (!are_inputs(vr, n)) {
+        for (size_t i = 0; i < n; i++) {
+            if (!is_settable(c, vr[i], REAL, value[i])) return fmi2Error;
+        }
     }
     for (size_t i = 0; i < n; i++) c->state.values[vr[i]] = value[i];
     c->state.stale = true;

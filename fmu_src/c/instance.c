@@ -9,8 +9,9 @@ typedef struct {
     double x[N_STATE + 1];
     double start_time;
     double time;                       /* of a continuous block */
-    int64_t next_sample;               /* of a sampled block: this and the next two */
+    int64_t next_sample;               /* of a sampled block: this and the next three */
     double sampled_from[N_STATE + 1];  /* state before the last sample */
+    int64_t slowly_changed;            /* the last sample changed more of the state than its first N_FAST */
     double sampled_inputs[N_INPUTS + 1]; /* inputs of the last sample */
     int64_t phase;
     int64_t stale;   /* the outputs do not yet follow the inputs and parameters in force */

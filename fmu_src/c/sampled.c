@@ -10,22 +10,39 @@ static void evaluate_first(Instance *c, double *x) {
 }
 
 #if SLOW_STEPS
-/* In place: most samples change few states. */
+/* The state is what every sample changes, N_FAST numbers, what slow steps change, and the held inputs, N_HELD. Each
+   sample is evaluated in place and touches the second part, by far the largest, only where a slow step is due. */
+static double step_of(Instance *c, const double *from, double *x) {
+    double due = 0.0;
+    const double *arg[N_ARGUMENTS] = {from, inputs_of(c), parameters_of(c), c->draws};
+    double *res[N_RESULTS] = {x, x + N_STATE - N_HELD, &due};
+    block_step(arg, res, c->integer_work, c->work, 0);
+    return due;
+}
+
+static void report_of(Instance *c, const double *x, const double *held) {
+    const double *arg[N_ARGUMENTS] = {x, held, inputs_of(c), parameters_of(c), c->draws};
+    double *res[N_RESULTS] = {reported_by(c)};
+    block_report(arg, res, c->integer_work, c->work, 0);
+}
+
 static void evaluate_next(Instance *c, const double *from, double *x) {
     const double *held = from + N_STATE - N_HELD;
-    double due = 0.0;
-    const double *seen[N_ARGUMENTS] = {from, inputs_of(c), parameters_of(c), c->draws};
-    double *changed[N_RESULTS] = {x, x + N_STATE - N_HELD, &due};
-    block_step(seen, changed, c->integer_work, c->work, 0);
-    if (due != 0.0) {
+    double due = step_of(c, from, x);
+    c->state.slowly_changed = due != 0.0;
+    if (c->state.slowly_changed) {
         const double *arg[N_ARGUMENTS] = {&due, x, held, inputs_of(c), parameters_of(c), c->draws};
         double *res[N_RESULTS] = {c->x_next};
         block_slow(arg, res, c->integer_work, c->work, 0);
         memcpy(x, c->x_next, (N_STATE - N_HELD) * sizeof(double));
     }
-    const double *reached[N_ARGUMENTS] = {x, held, inputs_of(c), parameters_of(c), c->draws};
-    double *res[N_RESULTS] = {reported_by(c)};
-    block_report(reached, res, c->integer_work, c->work, 0);
+    report_of(c, x, held);
+}
+
+static void keep_state(State *s) {
+    memcpy(s->sampled_from, s->x, N_FAST * sizeof(double));
+    memcpy(s->sampled_from + N_STATE - N_HELD, s->x + N_STATE - N_HELD, N_HELD * sizeof(double));
+    if (s->slowly_changed) memcpy(s->sampled_from + N_FAST, s->x + N_FAST, (N_STATE - N_HELD - N_FAST) * sizeof(double));
 }
 #else
 static void evaluate_next(Instance *c, const double *from, double *x) {
@@ -33,6 +50,8 @@ static void evaluate_next(Instance *c, const double *from, double *x) {
     double *res[N_RESULTS] = {x, reported_by(c)};
     block_next(arg, res, c->integer_work, c->work, 0);
 }
+
+static void keep_state(State *s) { memcpy(s->sampled_from, s->x, sizeof s->x); }
 #endif
 
 static void remember_inputs(State *s) { memcpy(s->sampled_inputs, s->values, N_INPUTS * sizeof(double)); }
@@ -62,9 +81,10 @@ static void take_sample(Instance *c) {
     State *s = &c->state;
     draw(c, s->next_sample);
     remember_inputs(s);
-    memcpy(s->sampled_from, s->x, sizeof s->x);
+    keep_state(s);
     if (s->next_sample == 0) {
         evaluate_first(c, s->x);
+        s->slowly_changed = true;
     } else {
         evaluate_next(c, s->sampled_from, s->x);
     }
@@ -78,8 +98,7 @@ static fmi2Status engine_step(Instance *c, double t, double h) {
     if (!(fabs(end - (double)s->next_sample) <= LONGEST_STEP)) {
         return refuse(c, "t = %.15g s lies more than %g samples away", t, LONGEST_STEP);
     }
-    int64_t after_last = (int64_t)ceil(end);
-    while (s->next_sample < after_last) take_sample(c);
+    while ((double)s->next_sample < end) take_sample(c);
     return fmi2OK;
 }
 

@@ -129,9 +129,10 @@ def rest_test(x: SimpleNamespace, u: SimpleNamespace, p: SimpleNamespace) -> Exp
 
 def output(x: SimpleNamespace, u: SimpleNamespace, p: SimpleNamespace) -> Expressions:
     """Outputs of one sample."""
-    ahead = unit(ca.vertcat(1, block.rate(x, u) * p.latency / 2))  # to second order in the turn
-    q = multiply(x.q, ahead)
-    roll, pitch, yaw = euler_from_quaternion(q)
+    # To second order in the turn. Angles do not mind that it is no unit quaternion; they are what takes longest.
+    ahead = multiply(x.q, ca.vertcat(1, block.rate(x, u) * p.latency / 2))
+    roll, pitch, yaw = euler_from_quaternion(ahead)
+    q = unit(ahead)
     tilt_covariance = full(x.P)[:2, :2]
     return dict(
         roll=roll,

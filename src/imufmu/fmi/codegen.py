@@ -92,6 +92,7 @@ def _constants(block: Block, functions: dict[str, Any], references: dict[str, in
         "N_STATE": total_size(block.held_state),
         "N_HELD": total_size(block.inputs),  # the last of the state
         "SLOW_STEPS": int("block_slow" in functions),
+        "N_FAST": functions["block_step"].numel_out(0) if "block_step" in functions else total_size(block.state),
         "N_NORMALS": block.normals,
         "N_ARGUMENTS": max(function.sz_arg() for function in needs),
         "N_RESULTS": max(function.sz_res() for function in needs),
