@@ -74,7 +74,7 @@ LOCALS = (
 def first_heading(q: Any, started: Any, u: SimpleNamespace, p: SimpleNamespace) -> Expressions:
     """STATES from one sample, delta = 0 where it has no field."""
     field, found = rotate(q, u.mag), ca.logic_and(started, is_there(u))
-    return begin(ca.if_else(found, field, 0), found, p.sample_period, p)
+    return with_turn(begin(ca.if_else(found, field, 0), found, p.sample_period, p))
 
 
 def is_there(u: SimpleNamespace) -> Any:
@@ -83,11 +83,10 @@ def is_there(u: SimpleNamespace) -> Any:
 
 
 def begin(field: Any, found: Any, T: Any, p: SimpleNamespace) -> Expressions:
-    """STATES by a first field in the frame of R, of T seconds."""
+    """STATES but ``turn`` by a first field in the frame of R, of T seconds."""
     f = parts(field)
     offset = ca.if_else(found, by_field(field, p), 0)
     return dict(
-        turn=half_turn(offset),
         offset=offset,
         drift=0,
         P_heading=ca.if_else(found, ca.vertcat(p.s_h**2 / T, 0, p.P0_r**2), ca.SX.zeros(3)),
@@ -110,8 +109,10 @@ def parts(field: Any) -> Any:
     return ca.vertcat(norm(field[:2]), field[2])
 
 
-def half_turn(angle: Any) -> Any:
-    return ca.vertcat(ca.cos(angle / 2), ca.sin(angle / 2))
+def with_turn(states: Expressions) -> dict[str, Any]:
+    """STATES from all others."""
+    half = states["offset"] / 2
+    return dict(states, turn=ca.vertcat(ca.cos(half), ca.sin(half)))
 
 
 def wrapped(angle: Any) -> Any:
@@ -123,11 +124,11 @@ def end_block(x: SimpleNamespace, u: SimpleNamespace, H: Any, p: SimpleNamespace
     """STATES at the end of a block."""
     field, present = rotate(x.q, u.mag), is_there(u)
     first, following = begin(field, present, H, p), filtered(field, present, x, H, p)
-    return {name: ca.if_else(x.heading_started, following[name], first[name]) for name in first}
+    return with_turn({name: ca.if_else(x.heading_started, following[name], first[name]) for name in first})
 
 
 def filtered(field: Any, present: Any, x: SimpleNamespace, H: Any, p: SimpleNamespace) -> Expressions:
-    """STATES one block on."""
+    """STATES but ``turn`` one block on."""
     fields, succeeds = fields_after(parts(field), present, x, H, p)
     offset, (P11, P12, P22) = x.offset + H * x.drift, ca.vertsplit(x.P_heading)
     P11 = ca.fmin(P11 + H * (2 * P12 + H * P22) + p.s_d**2 * H, pi**2)  # (15)
@@ -140,7 +141,7 @@ def filtered(field: Any, present: Any, x: SimpleNamespace, H: Any, p: SimpleName
     innovation = wrapped(wrapped(by_field(field, p) - offset))
     offset, drift = wrapped(offset + P11 * gain * innovation), x.drift + P12 * gain * innovation
     P = ca.vertcat(P11 - P11**2 * gain, P12 - P11 * P12 * gain, P22 - P12**2 * gain)
-    return dict(turn=half_turn(offset), offset=offset, drift=drift, P_heading=P, heading_started=1, **fields)
+    return dict(offset=offset, drift=drift, P_heading=P, heading_started=1, **fields)
 
 
 def fields_after(f: Any, present: Any, x: SimpleNamespace, H: Any, p: SimpleNamespace) -> tuple[dict[str, Any], Any]:
