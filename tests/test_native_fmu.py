@@ -7,6 +7,7 @@ import math
 import struct
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from itertools import product
 from typing import Any
 
 import fmu
@@ -158,6 +159,37 @@ def test_variables_are_refused_by_name_in_the_functions_of_another_type() -> Non
     instance.close()
 
 
+@pytest.mark.parametrize("name", NAMES)
+def test_the_first_and_last_variable_of_each_kind_is_set_and_read_by_the_rules_of_its_kind(name: str) -> None:
+    """Value references count inputs, parameters, outputs, locals: neighbours follow different rules."""
+    instance = native(name).initialise()
+    variables = sorted(instance.model.modelVariables, key=lambda v: v.valueReference)
+    first_and_last = [
+        kind[end] for c in ("input", "output", "local") for end in (0, -1) if (kind := of_causality(variables, c))
+    ]
+    for variable in first_and_last:
+        references, value = [variable.valueReference], instance.slave.getReal([variable.valueReference])
+        if variable.causality == "input":
+            instance.slave.setReal(references, [0.25])
+            assert instance.slave.getReal(references) == [0.25]
+        else:
+            message = refusal(instance, lambda: instance.slave.setReal(references, value))  # noqa: B023
+            assert message == f"{name}: {variable.name} is calculated and cannot be set"
+    for variable in (of_causality(variables, "parameter")[end] for end in (0, -1)):
+        setter = {"Real": instance.slave.setReal, "Integer": instance.slave.setInteger}[variable.type]
+        if variable.variability == "fixed":
+            message = refusal(instance, lambda: setter([variable.valueReference], [1]))  # noqa: B023
+            assert message.startswith(f"{name}: {variable.name} is fixed once the simulation runs")
+    one_more = variables[-1].valueReference + 1
+    for call in (lambda: instance.slave.getReal([one_more]), lambda: instance.slave.setReal([one_more], [0.0])):
+        assert refusal(instance, call) == f"{name}: no variable has value reference {one_more}"
+    instance.close()
+
+
+def of_causality(variables: list[Any], causality: str) -> list[Any]:
+    return [variable for variable in variables if variable.causality == causality]
+
+
 def test_what_is_not_there_is_refused_and_says_so() -> None:
     instance = native().initialise()
     slave, gyro = instance.slave, [instance.variables["gyro[1]"].valueReference]
@@ -301,8 +333,12 @@ def derivative(instance: fmu.Fmu, output: str, with_respect_to: str) -> float:
     return float(instance.slave.getDirectionalDerivative([unknown], [known], [1.0])[0])
 
 
-@pytest.mark.parametrize("steps", [0, 1, 5])
-@pytest.mark.parametrize("name", [*(name for name, block in BLOCKS.items() if block.inputs), "imu+lee2012"])
+WITH_INPUTS = [*(name for name, block in BLOCKS.items() if block.inputs), "imu+lee2012"]
+# Of plumb, the sixth sample takes a slow step and the seventh starts from what that has changed.
+SLOW_STEPS = [("plumb", 6), ("plumb", 7)]
+
+
+@pytest.mark.parametrize(("name", "steps"), [*product(WITH_INPUTS, (0, 1, 5)), *SLOW_STEPS])
 def test_directional_derivatives_are_those_of_repeating_the_last_step_with_other_inputs(name: str, steps: int) -> None:
     """Of every output along a random direction of inputs, against the central difference."""
     rng, block = np.random.default_rng(9), block_called(name)
