@@ -5,10 +5,13 @@ from __future__ import annotations
 import motions
 import numpy as np
 import pytest
+from fmpy.fmi1 import FMICallException
+from native_fmus import native
 
 from imufmu.cosim import System, locate
 from imufmu.cosim import simulate as cosimulate
 from imufmu.estimators import lee2012
+from imufmu.instance import StepError, instantiate
 from imufmu.plants import handheld, human_segment, pendulum
 from imufmu.running import Stream, run, simulate
 from imufmu.sensors import imu
@@ -138,3 +141,33 @@ def test_the_sample_period_of_a_plant_chain_cannot_outgrow_the_solver():
 def test_blocks_that_do_not_fit_are_refused(blocks, fault):
     with pytest.raises(DeclarationError, match=fault):
         series(*blocks)
+
+
+def test_a_chain_whose_plant_diverges_refuses_the_step_and_keeps_its_state() -> None:
+    """As the plant alone does: a damping of 1e4 N.m.s/rad is too stiff for 1 ms. In process and native."""
+    chain, stiff = series(pendulum.PENDULUM, imu.BLOCK, lee2012.BLOCK), {"pendulum.damping": 1e4}
+    instance = instantiate(chain)
+    instance.p[:] = chain.parameter_vector(stiff)
+    instance.initialise(0.0)
+    compiled = native("pendulum+imu+lee2012").initialise({"pendulum.damping[1]": 1e4})
+    for k in range(100):
+        before = instance.get_state(), compiled.reals()
+        try:
+            instance.do_step(0.01 * k, 0.01)
+        except StepError as error:
+            assert "pendulum_imu_lee2012: not finite at t = " in str(error) and "sample_period below 0.01 s" in str(
+                error
+            )
+            break
+        compiled.step(0.01 * k, 0.01)
+    else:
+        pytest.fail("it did not diverge")
+    assert instance.get_state() == before[0]
+    with pytest.raises(FMICallException):
+        compiled.step(0.01 * k, 0.01)
+    assert "sample_period below 0.01 s" in compiled.log[-1][1]
+    assert compiled.reals() == before[1]
+    compiled.close()
+    nothing = {s.name: np.zeros((100, s.size)) for s in chain.inputs}
+    with pytest.raises(StepError, match="not finite at t = "):
+        run(chain, nothing, stiff)

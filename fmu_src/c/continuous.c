@@ -24,13 +24,6 @@ static void advance(Instance *c, double t, double h) {
     memcpy(c->state.x, c->x_next, sizeof c->x_next);
 }
 
-static bool all_finite(const double *values, int n) {
-    for (int i = 0; i < n; i++) {
-        if (!isfinite(values[i])) return false;
-    }
-    return true;
-}
-
 static fmi2Status engine_step(Instance *c, double t, double h) {
     State *s = &c->state;
     double max_step = s->values[PERIOD], time_before = s->time, x_before[N_STATE + 1];

@@ -33,6 +33,15 @@ static double *inputs_of(Instance *c) { return c->state.values; }
 static double *parameters_of(Instance *c) { return c->state.values + N_INPUTS; }
 static double *reported_by(Instance *c) { return c->state.values + N_INPUTS + N_PARAMETERS; }
 
+#if HAS_SOLVER
+static bool all_finite(const double *values, int n) {
+    for (int i = 0; i < n; i++) {
+        if (!isfinite(values[i])) return false;
+    }
+    return true;
+}
+#endif
+
 static void to_start_values(State *s) {
     memset(s, 0, sizeof *s);
     for (int i = 0; i < N_VARIABLES; i++) s->values[i] = VARIABLES[i].start;

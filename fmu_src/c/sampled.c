@@ -98,7 +98,17 @@ static fmi2Status engine_step(Instance *c, double t, double h) {
     if (!(fabs(end - (double)s->next_sample) <= LONGEST_STEP)) {
         return refuse(c, "t = %.15g s lies more than %g samples away", t, LONGEST_STEP);
     }
+#if HAS_SOLVER
+    State before = *s;
+#endif
     while ((double)s->next_sample < end) take_sample(c);
+#if HAS_SOLVER
+    if (!all_finite(reported_by(c), N_REPORTED)) {
+        *s = before;
+        return refuse(c, "not finite at t = %.15g s; its plant needs a sample_period below %g s, or calmer inputs", t + h,
+                      sample_period(c));
+    }
+#endif
     return fmi2OK;
 }
 

@@ -105,6 +105,11 @@ class Block:
         return tuple((names.index(name), width) for name, width in self.seeds)
 
     @property
+    def has_solver(self) -> bool:
+        """Whether a plant is inside, whose solution may diverge: then what is reported need not be finite."""
+        return False
+
+    @property
     def reported(self) -> tuple[Signal, ...]:
         """Every signal the block reports: outputs, then locals."""
         return (*self.outputs, *self.locals)
@@ -328,6 +333,10 @@ class ContinuousBlock(Block):
     def _framework_parameters(self) -> tuple[Parameter, ...]:
         max_step = vocabulary.max_step(self.longest_step)
         return (max_step, vocabulary.SEED) if self.normals else (max_step,)
+
+    @property
+    def has_solver(self) -> bool:
+        return True
 
     @cached_property
     def initial_function(self) -> Any:

@@ -142,8 +142,13 @@ class SampledInstance(Instance):
         end = (t + h - self.start_time) / self.sample_period - CLOCK_TOLERANCE
         if not abs(end - self.next_sample) <= LONGEST_STEP:
             raise StepError(f"{self.block.name}: t = {t} s lies more than {LONGEST_STEP} samples away")
+        before = (self.get_state(), self.y.copy()) if self.block.has_solver else None
         for _ in range(self.next_sample, math.ceil(end)):
             self.sample()
+        if before and not np.isfinite(self.y).all():
+            self.set_state(before[0])
+            self.y[:] = before[1]
+            raise StepError(chain_diverged(self.block, t + h, self.sample_period))
 
     def _draw(self, k: int) -> None:
         if not self.block.normals:
@@ -228,6 +233,12 @@ def solver_steps(h: float, max_step: float) -> int:
 def diverged(block: Block, t: float, max_step: float) -> str:
     """Message for a solution that is not finite any more at t (s)."""
     return f"{block.name}: not finite at t = {t} s; the solver needs a max_step below {max_step:g} s, or calmer inputs"
+
+
+def chain_diverged(block: Block, t: float, sample_period: float) -> str:
+    """Message for a series whose plant's solution is not finite any more at t (s)."""
+    needs = f"its plant needs a sample_period below {sample_period:g} s, or calmer inputs"
+    return f"{block.name}: not finite at t = {t} s; {needs}"
 
 
 def instantiate(block: Block) -> SampledInstance | ContinuousInstance:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from .block import Block, ContinuousBlock, SampledBlock
-from .instance import SampledInstance, StepError, diverged, solver_steps
+from .instance import SampledInstance, StepError, chain_diverged, diverged, solver_steps
 from .noise import draws
 from .signals import Signal, State, total_size
 
@@ -40,7 +40,8 @@ def run(
 
     inputs: array (n,) or (n, k) per input name; a missing name stays at its start value. NaN marks missing samples.
     parameters: values by name. initial_state: replaces the block's own state of that name after the first sample.
-    Raises ParameterError for parameters, ValueError for inputs that do not fit.
+    Raises ParameterError for parameters, ValueError for inputs that do not fit, StepError where the plant of a series
+    diverges.
     """
     u = _input_rows(block, inputs)
     p = block.parameter_vector(parameters)
@@ -64,7 +65,10 @@ def run(
         x = np.array(states[:, count - 1]).ravel()
         y[first : first + count] = np.array(rows).T[:count]
     period = p[_names(block).index("sample_period")]
-    return Trajectory(start_time + np.arange(n) * period, _by_name(block.reported, y))
+    time = start_time + np.arange(n) * period
+    if block.has_solver and not np.isfinite(y).all():
+        raise StepError(chain_diverged(block, time[np.argmin(np.isfinite(y).all(axis=1))], period))
+    return Trajectory(time, _by_name(block.reported, y))
 
 
 def simulate(

@@ -121,6 +121,10 @@ class Series(SampledBlock):
         return (period, *(replace(vocabulary.SEED, name=name) for name, _ in self.seeds))
 
     @property
+    def has_solver(self) -> bool:
+        return isinstance(self.blocks[0], ContinuousBlock)
+
+    @property
     def seeds(self) -> tuple[tuple[str, int], ...]:
         own = [(block.name, name, width) for block in self.blocks for name, width in block.seeds]
         return tuple((name if len(own) == 1 else f"{block}.{name}", width) for block, name, width in own)

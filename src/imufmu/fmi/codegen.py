@@ -91,6 +91,7 @@ def _constants(block: Block, functions: dict[str, Any], references: dict[str, in
         "N_REPORTED": total_size(block.reported),
         "N_STATE": total_size(block.held_state),
         "N_HELD": total_size(block.inputs),  # the last of the state
+        "HAS_SOLVER": int(block.has_solver),
         "SLOW_STEPS": int("block_slow" in functions),
         "N_FAST": functions["block_step"].numel_out(0) if "block_step" in functions else total_size(block.state),
         "N_NORMALS": block.normals,
