@@ -105,6 +105,7 @@ def run(
       imufmu run pendulum_swing_up --report swing_up.html --animate swing_up.gif
       imufmu run my_system.ssd --stop 60 --step 0.005 --output run.csv
 
+    The heading counts from East: an estimator without a magnetometer keeps what it does not know at the start.
     With --report or --animate the results also hold the points of the body, where the plant has the local variable
     skeleton.
     """
