@@ -19,6 +19,7 @@ from imufmu.block import Block, SampledBlock
 from imufmu.fmi.build import BuildError, build_fmu, cached_fmu
 from imufmu.fmi.documentation import documentation_page
 from imufmu.fmi.model_description import guid
+from imufmu.plants import truth
 from imufmu.registry import BLOCKS
 from imufmu.signals import UNITS
 
@@ -149,12 +150,12 @@ def test_an_unknown_block_and_a_folder_that_is_a_file_are_refused_by_name(tmp_pa
 
 @pytest.mark.parametrize("block", BLOCKS.values(), ids=lambda block: block.name)
 def test_the_documentation_holds_the_equations_of_every_module_that_the_block_is_made_of(block: Block) -> None:
-    """A module of the same package that numbers equations of its own, in its docstring."""
+    """A module of the same package that numbers equations of its own, and what every plant's truth is."""
     module = sys.modules[block.output.__module__]
     used = [sys.modules[getattr(value, "__module__", None) or module.__name__] for value in vars(module).values()]
     used += [value for value in vars(module).values() if inspect.ismodule(value)]
     page = html.unescape(documentation_page(block))
     for part in {module, *used}:
         text = inspect.cleandoc(part.__doc__ or "")
-        if part.__name__.rpartition(".")[0] == module.__package__ and "(1)" in text:
+        if part.__name__.rpartition(".")[0] == module.__package__ and ("(1)" in text or part is truth):
             assert text in page, part

@@ -142,12 +142,11 @@ class SampledInstance(Instance):
         end = (t + h - self.start_time) / self.sample_period - CLOCK_TOLERANCE
         if not abs(end - self.next_sample) <= LONGEST_STEP:
             raise StepError(f"{self.block.name}: t = {t} s lies more than {LONGEST_STEP} samples away")
-        before = (self.get_state(), self.y.copy()) if self.block.has_solver else None
+        before = self.get_state() if self.block.has_solver else None
         for _ in range(self.next_sample, math.ceil(end)):
             self.sample()
         if before and not np.isfinite(self.y).all():
-            self.set_state(before[0])
-            self.y[:] = before[1]
+            self.set_state(before)
             raise StepError(chain_diverged(self.block, t + h, self.sample_period))
 
     def _draw(self, k: int) -> None:
