@@ -1,7 +1,6 @@
 """Two estimators on the double lane change of ISO 3888-1, slow and fast: the same car, the same IMU and readings."""
 
-from imufmu.cosim import simulate
-from imufmu.evaluate.systems import comparisons
+from imufmu import comparisons, simulate
 
 FIGURES = ("tilt_rmse_deg", "tilt_max_deg", "external_acceleration_norm_rmse_m_s2")
 

@@ -6,7 +6,7 @@ from tempfile import TemporaryDirectory
 import fmpy
 import numpy as np
 
-from imufmu.fmi.build import build_fmu
+from imufmu import build_fmu
 
 time = np.arange(0.0, 4.0, 0.01)
 roll = np.radians(30) * np.clip(time - 1.0, 0.0, 1.0)  # one second of turning about x, from 1 s on

@@ -49,8 +49,7 @@ def system():
 
 
 if __name__ == "__main__":
-    from imufmu.cosim import simulate
-    from imufmu.evaluate.systems import comparisons
+    from imufmu import comparisons, simulate
 
     with TemporaryDirectory() as folder:
         FmuBuilder.build_FMU(__file__, dest=folder)

@@ -1,8 +1,8 @@
 """FMU of a sensor on a segment of a moving person."""
 
 from imufmu.fmi.slave import BlockSlave
-from imufmu.plants import human_segment
+from imufmu.plants import human
 
 
 class HumanSegment(BlockSlave):
-    block = human_segment.BLOCK
+    block = human.BLOCK

@@ -1,9 +1,23 @@
-"""Fixtures of every test."""
+"""Fixtures of every test, and the folder of what a run builds."""
 
 from __future__ import annotations
 
+import os
+import shutil
+import tempfile
+
 import numpy as np
 import pytest
+
+from support.places import SHARED
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Make one folder for all workers of this run; the process that starts them deletes it at the end."""
+    if hasattr(config, "workerinput"):
+        return
+    os.environ[SHARED] = tempfile.mkdtemp(prefix="imufmu_tests_")
+    config.add_cleanup(lambda: shutil.rmtree(os.environ.pop(SHARED), ignore_errors=True))
 
 
 @pytest.fixture

@@ -7,9 +7,9 @@ from pathlib import Path
 import matplotlib
 import numpy as np
 
-from imufmu.plants.human_segment import BLOCK, SEGMENTS
-from imufmu.running import simulate
-from imufmu.vocabulary import GRAVITY
+from imufmu.blocks.running import simulate
+from imufmu.blocks.vocabulary import GRAVITY
+from imufmu.plants.human.plant import BLOCK, SEGMENTS
 
 matplotlib.use("Agg")
 from matplotlib import pyplot as plt

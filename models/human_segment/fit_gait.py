@@ -1,4 +1,4 @@
-"""Fit the Fourier series of src/imufmu/plants/human_gait.py and print them: python models/human_segment/fit_gait.py
+"""Fit the Fourier series of src/imufmu/plants/human/gait.py and print them: python models/human_segment/fit_gait.py
 
 Least squares over: the published key points (each over 2 deg); the point of the foot that carries (heel, then heel and
 ball, then ball), which must stay on the ground where it is (each over 2 cm), and clear it by 1 cm in the swing; angles
@@ -18,9 +18,9 @@ import casadi as ca
 import numpy as np
 from scipy.optimize import least_squares
 
-from imufmu.plants.human_body import BALL, FOOT, HEEL, segments
-from imufmu.plants.human_gait import HARMONICS, RUNNING, WALKING, Gait, gait_posture, series
-from imufmu.vocabulary import GRAVITY
+from imufmu.blocks.vocabulary import GRAVITY
+from imufmu.plants.human.body import BALL, FOOT, HEEL, segments
+from imufmu.plants.human.gait import HARMONICS, RUNNING, WALKING, Gait, gait_posture, series
 
 HEIGHT = 1.75
 WALK = SimpleNamespace(height=HEIGHT, speed=1.37, cadence=113.0, g=GRAVITY)

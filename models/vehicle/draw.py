@@ -9,8 +9,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from imufmu.cosim import Result, simulate
-from imufmu.plants.vehicle_driver import LANE_LENGTHS, LANE_OFFSET, lane_widths
+from imufmu import Result, simulate
+from imufmu.plants.vehicle.driver import LANE_LENGTHS, LANE_OFFSET, lane_widths
 
 CAR, MARK = "#26323f", "#e07a1f"
 ESTIMATES = {"lee2012": "#d1495b", "rizun2008": "#edae49", "plumb_alone": "#6a994e", "plumb": "#2e86ab"}

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from .block import Block
+from .blocks.block import Block
 from .estimators import bennett2014, lee2012, leechoi2018, plumb, rizun2008, zihajehzadeh2014
-from .plants import handheld, human_segment, pendulum, vehicle
+from .plants import handheld, human, pendulum, vehicle
 from .sensors import imu
 
 ESTIMATORS: tuple[Block, ...] = (
@@ -19,7 +19,7 @@ PLANTS: tuple[Block, ...] = (
     pendulum.PENDULUM,
     pendulum.DOUBLE_PENDULUM,
     handheld.BLOCK,
-    human_segment.BLOCK,
+    human.BLOCK,
     vehicle.BLOCK,
 )
 SENSORS: tuple[Block, ...] = (imu.BLOCK,)

@@ -25,7 +25,7 @@ from urllib.parse import unquote, urlparse
 import fmpy.ssp
 from lxml import etree
 
-from ..archives import parse_xml
+from ..files.archives import parse_xml
 
 SSP = "http://ssp-standard.org/SSP1/"
 NAMESPACES = {

@@ -25,7 +25,7 @@ from typing import Any
 
 import numpy as np
 
-from ..archives import open_fmu
+from ..files.archives import open_fmu
 from .exchange import Exchange
 from .interrupt import interrupt_between_calls
 from .order import signal_flow

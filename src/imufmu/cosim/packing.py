@@ -13,7 +13,7 @@ from typing import Any
 
 from lxml import etree
 
-from ..files import atomic_write
+from ..files.atomic import atomic_write
 from .description import NAMESPACES, read_xml
 from .interface import representation, unit_of
 from .settings import Setting

@@ -10,13 +10,13 @@ from typing import Any
 
 import numpy as np
 
-from ..archives import open_fmu
+from ..blocks.vocabulary import ACCEL, GYRO, MAG
+from ..files.archives import open_fmu
+from ..files.csv_table import write_csv
 from ..fmi.build import cached_fmu
 from ..fmi.native import cached_native_fmu
-from ..recordings import Recording, hold_missing
+from ..recordings.reading import Recording, hold_missing
 from ..registry import BLOCKS, ESTIMATORS
-from ..tables import write_csv
-from ..vocabulary import ACCEL, GYRO, MAG
 from .interface import Interface, WiringError, unit_of
 from .interrupt import interrupt_between_calls
 from .settings import Setting, given_settings

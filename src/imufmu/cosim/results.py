@@ -14,8 +14,8 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-from ..files import atomic_write
-from ..tables import write_csv
+from ..files.atomic import atomic_write
+from ..files.csv_table import write_csv
 from .interface import near
 
 _ELEMENT = re.compile(r"(.+)\[(\d+(?:,\d+)*)\]")

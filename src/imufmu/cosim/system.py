@@ -11,10 +11,10 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from ..archives import ArchiveError, read_fmu, unpack
+from ..files.archives import ArchiveError, read_fmu, unpack
+from ..files.locations import models_folder
 from ..fmi.build import cached_fmu
 from ..fmi.native import cached_native_fmu
-from ..locations import models_folder
 from ..registry import BLOCKS
 from .description import Component, Description, DescriptionError, read_description
 from .interface import Interface, WiringError

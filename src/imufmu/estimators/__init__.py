@@ -1,0 +1,1 @@
+"""One estimator, one file, or a folder where it has parts."""

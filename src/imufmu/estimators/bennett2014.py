@@ -45,10 +45,10 @@ from typing import Any
 
 import casadi as ca
 
-from .. import vocabulary as v
-from ..block import Expressions, SampledBlock
-from ..rotations import angle_of, root
-from ..signals import Parameter, Signal, State, integer, real, switch
+from ..blocks import vocabulary as v
+from ..blocks.block import Expressions, SampledBlock
+from ..blocks.rotations import angle_of, root
+from ..blocks.signals import Parameter, Signal, State, integer, real, switch
 from .kalman import symmetric, update
 from .running_median import DELAY, WINDOW, running_median
 

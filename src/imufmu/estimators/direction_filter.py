@@ -22,8 +22,8 @@ from typing import Any
 
 import casadi as ca
 
-from ..rotations import root, skew, unit
-from ..signals import integer, real
+from ..blocks.rotations import root, skew, unit
+from ..blocks.signals import integer, real
 
 NO_DIRECTION = 1e-6  # of the usual magnitude: a first sample shorter than this points nowhere
 LARGEST_TRACE = 1e6  # of P: a longer prediction without update would overflow; nothing is known by then

@@ -26,10 +26,10 @@ from typing import Any
 
 import casadi as ca
 
-from .. import vocabulary as v
-from ..block import Expressions, SampledBlock
-from ..rotations import roll_pitch, vertical_from_roll_pitch
-from ..signals import Signal, State, integer, real, switch
+from ..blocks import vocabulary as v
+from ..blocks.block import Expressions, SampledBlock
+from ..blocks.rotations import roll_pitch, vertical_from_roll_pitch
+from ..blocks.signals import Signal, State, integer, real, switch
 from .direction_filter import (
     ACCEL_VARIANCE,
     GRAVITY,

@@ -44,10 +44,10 @@ from typing import Any
 
 import casadi as ca
 
-from .. import vocabulary as v
-from ..block import Expressions, SampledBlock
-from ..rotations import TINY, quaternion_from_rotation_vector, roll_pitch, root, rotate, rotate_back, unit
-from ..signals import Signal, State, integer, real, switch
+from ..blocks import vocabulary as v
+from ..blocks.block import Expressions, SampledBlock
+from ..blocks.rotations import TINY, quaternion_from_rotation_vector, roll_pitch, root, rotate, rotate_back, unit
+from ..blocks.signals import Signal, State, integer, real, switch
 from .direction_filter import has_vertical, rate
 
 EXACT = 1  # discretisation: the accelerometer sample turns with the sensor while it is held

@@ -38,11 +38,10 @@ from typing import Any
 
 import casadi as ca
 
-from .. import vocabulary as v
-from ..block import Expressions, SampledBlock
-from ..plants.truth import MID_EUROPE
-from ..rotations import angle_between, angle_of, matrix_from_euler, quaternion_from_euler, roll_pitch, unit
-from ..signals import Signal, State, real, switch
+from ..blocks import vocabulary as v
+from ..blocks.block import Expressions, SampledBlock
+from ..blocks.rotations import angle_between, angle_of, matrix_from_euler, quaternion_from_euler, roll_pitch, unit
+from ..blocks.signals import Signal, State, real, switch
 from .direction_filter import (
     ACCEL_VARIANCE,
     GRAVITY,
@@ -254,7 +253,7 @@ yaw, times tan(dip).""",
         real(
             "m_ref",
             "uT",
-            MID_EUROPE,
+            v.MID_EUROPE,
             (-v.MAG.maximum, v.MAG.maximum),
             "Local field East, North, Up, of any length",
             shape=(3,),

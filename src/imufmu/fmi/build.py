@@ -16,17 +16,15 @@ from platformdirs import user_cache_path
 from pythonfmu.builder import FmuBuilder
 
 from .. import __version__
-from ..files import atomic_write
-from ..locations import fmu_src_folder
+from ..compiled.compilers import BuildError
+from ..files.atomic import atomic_write
+from ..files.cache import cached
+from ..files.locations import fmu_src_folder
 from ..registry import BLOCKS
 from . import runtime
 from .documentation import icon, write_documentation
 
 _FIXED_TIME = (1980, 1, 1, 0, 0, 0)  # the earliest a zip can say
-
-
-class BuildError(ValueError):
-    """An FMU cannot be built; the message says why."""
 
 
 def build_fmu(name: str, folder: Path) -> Path:
@@ -53,13 +51,13 @@ def build_fmu(name: str, folder: Path) -> Path:
 def cached_fmu(name: str) -> Path:
     """Path of the FMU of a registered block in the user's cache, built when its source has changed."""
     folder = user_cache_path("imufmu") / f"{__version__}-{source_digest([fmu_src_folder() / f'{name}_fmu.py'])}"
-    path = folder / f"{name}.fmu"
-    return path if path.is_file() else build_fmu(name, folder)
+    return cached(folder / f"{name}.fmu", lambda: build_fmu(name, folder))
 
 
 def source_digest(sources: Sequence[Path]) -> str:
     """Short hash of the runtime, of what makes FMUs of it, and of these files; those that are missing are left out."""
-    makers = [path for path in Path(__file__).parent.rglob("*") if "__pycache__" not in path.parts]
+    rooms = (runtime.PACKAGE / room for room in ("compiled", "fmi"))
+    makers = [path for room in rooms for path in room.rglob("*") if "__pycache__" not in path.parts]
     digest = hashlib.sha256(runtime.fingerprint(runtime.PACKAGE).encode())
     for source in sorted(path for path in (*makers, *sources) if path.is_file()):
         digest.update(source.read_bytes())

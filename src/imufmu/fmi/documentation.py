@@ -10,12 +10,10 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
-from matplotlib.figure import Figure
-from matplotlib.patches import Circle
 
 from .. import __version__
-from ..block import Block, SampledBlock
-from ..signals import Parameter, Signal
+from ..blocks.block import Block, SampledBlock
+from ..blocks.signals import Parameter, Signal
 
 
 def signal_rows(signals: tuple[Signal, ...]) -> list[dict[str, str]]:
@@ -41,17 +39,21 @@ def signal_rows(signals: tuple[Signal, ...]) -> list[dict[str, str]]:
 def equations(block: Block) -> str:
     """The module docstring of the block: its equations, symbols and source; then those of the modules it names.
 
-    A name with an underscore, or behind the word "module", is one where such a module of the same package is loaded.
+    A name with an underscore, or behind the word "module", is one where such a module of the same room is loaded; where
+    the block has a folder of its own, so is every word that a module there is called by.
     """
     module = inspect.getmodule(block.output)
     if module is None:
         return ""
-    package, _, own = module.__name__.rpartition(".")
+    folder = module.__name__.rpartition(".")[0]
+    room = ".".join(folder.split(".")[:2])
     text = inspect.cleandoc(module.__doc__ or "")
-    names = dict.fromkeys(re.findall(r"\b[a-z]\w*_\w+|(?<=\bmodule )[a-z]\w*", text))
-    parts = [name for name in names if name != own and f"{package}.{name}" in sys.modules]
-    docs = {name: inspect.cleandoc(sys.modules[f"{package}.{name}"].__doc__ or "") for name in parts}
-    return "\n\n\n".join([text, *(f"{name}\n\n{doc}" for name, doc in docs.items())])
+    names = re.findall(r"\b[a-z]\w*_\w+|(?<=\bmodule )[a-z]\w*", text)
+    own = re.findall(r"\b[a-z]\w*", text) if folder != room else []
+    wanted = dict.fromkeys([*(f"{folder}.{name}" for name in own), *(f"{room}.{name}" for name in names)])
+    parts = [sys.modules[name] for name in wanted if name in sys.modules and name != module.__name__]
+    docs = [f"{part.__name__.rpartition('.')[2]}\n\n{inspect.cleandoc(part.__doc__ or '')}" for part in parts]
+    return "\n\n\n".join([text, *docs])
 
 
 def documentation_page(block: Block, platforms: Sequence[str] = ()) -> str:
@@ -80,6 +82,9 @@ def write_documentation(block: Block, folder: Path) -> None:
 
 def icon(name: str) -> bytes:
     """PNG of an artificial horizon above the block's name."""
+    from matplotlib.figure import Figure  # takes long to load, and most who read about a block want no icon
+    from matplotlib.patches import Circle
+
     figure = Figure(figsize=(1.28, 1.28), dpi=100)
     axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
     axes.set_axis_off()

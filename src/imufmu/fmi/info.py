@@ -5,9 +5,8 @@ from __future__ import annotations
 import zipfile
 from pathlib import Path
 
-from ..archives import read_fmu
-from ..registry import BLOCKS
-from .build import BuildError, cached_fmu
+from ..compiled.compilers import BuildError
+from ..files.archives import read_fmu
 
 COLUMNS = ("variable", "causality", "variability", "unit", "start", "min", "max", "description")
 
@@ -17,9 +16,7 @@ def describe(fmu: str) -> tuple[list[str], list[list[str]]]:
 
     Raises BuildError for a name that is neither, ArchiveError for an FMU that cannot be used here.
     """
-    if fmu not in BLOCKS and Path(fmu).suffix.lower() != ".fmu":
-        raise BuildError(f"no block is called {fmu!r}; there is {', '.join(BLOCKS)}, or give an .fmu file")
-    path = cached_fmu(fmu) if fmu in BLOCKS else Path(fmu)
+    path = Path(fmu) if Path(fmu).suffix.lower() == ".fmu" else _of_block(fmu)
     model = read_fmu(path)
     slave, experiment = model.coSimulation, model.defaultExperiment
     with zipfile.ZipFile(path) as archive:
@@ -38,3 +35,13 @@ def describe(fmu: str) -> tuple[list[str], list[list[str]]]:
         texts = (v.name, v.causality, v.variability, unit, v.start, v.min, v.max, v.description)
         rows.append(["" if text is None else str(text) for text in texts])
     return heading, rows
+
+
+def _of_block(name: str) -> Path:
+    """FMU of a registered block. Raises BuildError."""
+    from ..registry import BLOCKS  # an .fmu file is told about without the equations of any block
+    from .build import cached_fmu
+
+    if name not in BLOCKS:
+        raise BuildError(f"no block is called {name!r}; there is {', '.join(BLOCKS)}, or give an .fmu file")
+    return cached_fmu(name)

@@ -13,9 +13,10 @@ from xml.etree.ElementTree import Element, SubElement, tostring
 import casadi as ca
 import numpy as np
 
-from .. import __version__, vocabulary
-from ..block import Block, ContinuousBlock, SampledBlock, Variable
-from ..signals import UNITS, Parameter
+from .. import __version__
+from ..blocks import vocabulary
+from ..blocks.block import Block, ContinuousBlock, SampledBlock, Variable
+from ..blocks.signals import UNITS, Parameter
 
 _NAMESPACE = uuid.UUID("7b0c9d52-4a0e-5c8e-9a53-3f6d8f0f7c11")  # of imufmu's GUIDs; any fixed value serves
 _STOP_TIME = 10.0

@@ -17,19 +17,28 @@ from xml.etree.ElementTree import indent, tostring
 from platformdirs import user_cache_path
 
 from .. import __version__
-from ..block import Block
-from ..files import atomic_write
-from ..locations import fmu_src_folder
+from ..blocks.block import Block
+from ..blocks.series import series
+from ..blocks.signals import DeclarationError
+from ..compiled.compilers import (
+    HEADERS,
+    PLATFORMS,
+    BuildError,
+    Platform,
+    commands,
+    compile_library,
+    identity,
+    own_platform,
+)
+from ..files.atomic import atomic_write
+from ..files.cache import cached
+from ..files.locations import fmu_src_folder
 from ..registry import BLOCKS
-from ..series import series
-from ..signals import DeclarationError
-from .build import BuildError, source_digest, write_archive
-from .codegen import generate
-from .compilers import HEADERS, PLATFORMS, Platform, commands, compile_library, identity, own_platform
+from .build import source_digest, write_archive
 from .documentation import documentation_page, icon
 from .model_description import NATIVE_SOURCE, model_description
+from .native_table import generate
 
-_SERIES = Path(__file__).parents[1] / "series.py"
 _HEADERS = ("fmi2Functions.h", "fmi2FunctionTypes.h", "fmi2TypesPlatform.h")
 
 
@@ -65,10 +74,9 @@ def cached_native_fmu(name: str) -> Path:
 
     Built when its source or the compiler has changed. Raises BuildError as ``build_native`` does.
     """
-    digest = hashlib.sha256(f"{source_digest([*_wrapper(), _SERIES])} {identity()}".encode()).hexdigest()
+    digest = hashlib.sha256(f"{source_digest(_wrapper())} {identity()}".encode()).hexdigest()
     folder = user_cache_path("imufmu") / f"{__version__}-native-{digest[:16]}"
-    path = folder / f"{block_called(name).name}.fmu"
-    return path if path.is_file() else build_native(name, folder)
+    return cached(folder / f"{block_called(name).name}.fmu", lambda: build_native(name, folder))
 
 
 def block_called(name: str) -> Block:
@@ -134,14 +142,16 @@ def _library(name: str, code: dict[str, bytes], platform: Platform) -> bytes:
     digest = hashlib.sha256(repr((sorted(code.items()), calls, identity())).encode())
     folder = user_cache_path("imufmu") / "native" / digest.hexdigest()[:16]
     kept = folder / file
-    if not kept.is_file():
+
+    def build() -> None:
         (folder / "sources").mkdir(parents=True, exist_ok=True)
         for source, content in code.items():
-            with atomic_write(folder / "sources" / source) as temporary:  # another process may compile them now
+            with atomic_write(folder / "sources" / source) as temporary:
                 temporary.write_bytes(content)
         with tempfile.TemporaryDirectory(prefix="imufmu_build_") as scratch:
             made = Path(scratch) / file
             compile_library(calls, folder / "sources" / NATIVE_SOURCE, made)
             with atomic_write(kept) as temporary:
                 shutil.copyfile(made, temporary)
-    return kept.read_bytes()
+
+    return cached(kept, build).read_bytes()

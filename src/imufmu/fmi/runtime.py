@@ -13,26 +13,14 @@ from pathlib import Path
 
 PACKAGE = Path(__file__).parents[1]
 
-_MODULES = (
-    "__init__",
-    "signals",
-    "vocabulary",
-    "rotations",
-    "noise",
-    "expressions",
-    "slow_parts",
-    "block",
-    "instance",
-    "fmi/slave",
-    "fmi/runtime",
-)
-_FOLDERS = ("estimators", "plants", "sensors")
+_MODULES = ("__init__", "fmi/__init__", "fmi/slave", "fmi/runtime")
+_FOLDERS = ("blocks", "estimators", "plants", "sensors")
 
 
 def files(package: Path) -> list[Path]:
     """The runtime's source files below a copy of the package, as relative paths."""
-    fixed = [Path(f"{module}.py") for module in (*_MODULES, "fmi/__init__")]
-    blocks = [path.relative_to(package) for folder in _FOLDERS for path in (package / folder).glob("*.py")]
+    fixed = [Path(f"{module}.py") for module in _MODULES]
+    blocks = [path.relative_to(package) for folder in _FOLDERS for path in (package / folder).rglob("*.py")]
     return sorted([*fixed, *blocks])
 
 

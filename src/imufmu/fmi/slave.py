@@ -18,9 +18,9 @@ from xml.etree.ElementTree import Element
 from pythonfmu import Fmi2Slave
 from pythonfmu.enums import Fmi2Status
 
-from ..block import Block, ParameterError, Variable
-from ..instance import SampledInstance, StepError, instantiate
-from ..signals import Parameter
+from ..blocks.block import Block, ParameterError, Variable
+from ..blocks.instance import SampledInstance, StepError, instantiate
+from ..blocks.signals import Parameter
 from .runtime import refusal, rejoin_installed
 
 _STARTING, _INITIALISING, _STEPPING = range(3)

@@ -1,0 +1,1 @@
+"""One plant, one file, or a folder where it has parts."""

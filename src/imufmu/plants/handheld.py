@@ -47,10 +47,10 @@ from typing import Any
 
 import casadi as ca
 
-from .. import vocabulary as v
-from ..block import ContinuousBlock, Expressions
-from ..rotations import multiply, quaternion_from_euler, rotate, unit
-from ..signals import Parameter, Signal, State, integer, real, switch
+from ..blocks import vocabulary as v
+from ..blocks.block import ContinuousBlock, Expressions
+from ..blocks.rotations import multiply, quaternion_from_euler, rotate, unit
+from ..blocks.signals import Parameter, Signal, State, integer, real, switch
 from .random_vectors import DRAWS, LINES, lines, random_vector, sum_of_lines
 from .time_functions import along, windows
 from .truth import OUTPUTS, PARAMETERS, magnetic_field, times, truth

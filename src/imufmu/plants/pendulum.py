@@ -62,10 +62,10 @@ from typing import Any
 
 import casadi as ca
 
-from .. import vocabulary as v
-from ..block import ContinuousBlock, Expressions
-from ..rotations import multiply, quaternion_from_euler, rotate_back
-from ..signals import Parameter, Signal, State, integer, real
+from ..blocks import vocabulary as v
+from ..blocks.block import ContinuousBlock, Expressions
+from ..blocks.rotations import multiply, quaternion_from_euler, rotate_back
+from ..blocks.signals import Parameter, Signal, State, integer, real
 from .pendulum_parts import (
     arms_to,
     chain_end,

@@ -20,7 +20,7 @@ from typing import Any
 
 import casadi as ca
 
-from ..rotations import norm, unit
+from ..blocks.rotations import norm, unit
 
 LINES = 12  # sinusoids per axis
 DRAWS = 2 * 3 * LINES  # standard normal draws behind one random vector

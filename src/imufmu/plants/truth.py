@@ -18,17 +18,13 @@ from __future__ import annotations
 from types import SimpleNamespace
 from typing import Any
 
-from .. import vocabulary as v
-from ..block import Expressions
-from ..rotations import euler_from_quaternion, matrix_from_quaternion
-from ..signals import Parameter, Signal, integer, real
+from ..blocks import vocabulary as v
+from ..blocks.block import Expressions
+from ..blocks.rotations import euler_from_quaternion, matrix_from_quaternion
+from ..blocks.signals import Parameter, Signal, integer, real
 from .time_functions import windows
 
 OUTPUTS: tuple[Signal, ...] = (*v.TRUTH, *v.IDEAL_IMU)
-
-# Near the middle of Europe, 50 deg N 10 deg E at sea level, at the start of 2025: International Geomagnetic Reference
-# Field, 14th generation (IAGA), to 0.1 uT. Declination 4 deg East, dip 66 deg.
-MID_EUROPE = (1.4, 20.1, -44.9)
 
 DISTURBANCES = 3
 
@@ -43,7 +39,7 @@ PARAMETERS: tuple[Parameter, ...] = (
     real(
         "earth_field",
         "uT",
-        MID_EUROPE,
+        v.MID_EUROPE,
         (-1e3, 1e3),
         "Magnetic flux density East, North, Up; start: mid-Europe, IGRF-14, 2025",
         shape=(3,),

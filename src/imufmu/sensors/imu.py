@@ -49,9 +49,9 @@ from typing import Any
 
 import casadi as ca
 
-from .. import vocabulary as v
-from ..block import Expressions, SampledBlock
-from ..signals import Parameter, Signal, State, real
+from ..blocks import vocabulary as v
+from ..blocks.block import Expressions, SampledBlock
+from ..blocks.signals import Parameter, Signal, State, real
 
 SENSORS = ((v.ANGULAR_VELOCITY, v.GYRO), (v.SPECIFIC_FORCE, v.ACCEL), (v.MAGNETIC_FIELD, v.MAG))  # ideal, reading
 AXES = 3 * len(SENSORS)

@@ -1,0 +1,117 @@
+"""Who takes part in a benchmark on real recordings, and with which parameters.
+
+A contender turns readings into signals. Estimators of the registry come with the parameters of their papers, and once
+more with those that suit a hand-held or body-worn device; filters of others (``peers``) come as they are.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from ..blocks.block import SampledBlock
+from ..blocks.running import run
+from ..blocks.vocabulary import ACCEL, GYRO, MAG, VERTICAL
+from ..registry import ESTIMATORS
+
+Readings = Mapping[str, np.ndarray]  # by signal name, (n, 3), NaN where missing
+
+TILT_TIME = 3.0  # s; a constant gyroscope bias b ends up as a tilt of TILT_TIME * b
+
+# What the estimators of papers need on real recordings, one set for all of them. All are given the same time constant:
+# longer than a movement, so that its acceleration averages out, and short against the drift of the gyroscope.
+_LOCAL_G = 9.81  # m/s2, Central Europe
+_MID_RATE = 2  # gyro_index: the mean of two samples is the rate half way between them
+FOR_REAL_RECORDINGS: Mapping[str, Mapping[str, Any]] = {
+    # sigma_a / (g sigma_g) is the time constant. sigma_g = 0.01 rad/s stays: it is no sensor's noise but the error of
+    # the scale, 1 % of 1 rad/s. Mode 2, as mode 1 gives the gentle parts of a movement more weight than the vigorous
+    # ones, and then the acceleration of a movement to and fro no longer averages out.
+    "lee2012": {"mode": 2, "sigma_a2": (_LOCAL_G * 0.01 * TILT_TIME) ** 2, "g": _LOCAL_G, "gyro_index": _MID_RATE},
+    # The same with c_b / (1 - c_a) in the place of sigma_a; c_a = 0.1 stays.
+    "leechoi2018": {"c_b": 0.9 * _LOCAL_G * 0.01 * TILT_TIME, "g": _LOCAL_G, "gyro_index": _MID_RATE},
+    # sqrt(2) / cutoff is the time constant.
+    "rizun2008": {"cutoff": 2**0.5 / TILT_TIME, "g": _LOCAL_G, "gyro_index": _MID_RATE},
+}
+
+# Its vertical is that of lee2012, with other variances.
+_TILT_OF_ANOTHER = ("zihajehzadeh2014",)
+
+# Magnetic North is North, and the norm of the field indoors that of Berlin's BROAD recordings at rest.
+_FIELD_OF_THE_RECORDING: Mapping[str, Mapping[str, Any]] = {
+    "zihajehzadeh2014": {"m_ref": (0.0, 20.1, -44.9), "h": 44.0, "g": _LOCAL_G, "gyro_index": _MID_RATE}
+}
+
+# Variants of an estimator that its paper treats as different filters.
+_VARIANTS: Mapping[str, Sequence[Mapping[str, Any]]] = {"lee2012": ({"mode": 2}, {"mode": 3})}
+
+
+@dataclass(frozen=True)
+class Contender:
+    """One filter with fixed parameters.
+
+    estimate(readings, sample_period): signals by name of imufmu.vocabulary, one row per row of the readings, with at
+    least ``vertical``. finds_bias: it estimates a constant gyroscope bias by itself.
+    """
+
+    name: str
+    estimate: Callable[[Readings, float], Readings]
+    parameters: Mapping[str, Any]
+    finds_bias: bool = False
+
+
+def with_papers_parameters(names: Sequence[str] = ()) -> list[Contender]:
+    """The estimators of these names, or all that need no more than gyroscope and accelerometer. Raises ValueError."""
+    found = []
+    for block in _blocks(names):
+        found.append(_contender(block, {}))
+        for variant in _VARIANTS.get(block.name, ()):
+            label = " ".join(f"{name}={value}" for name, value in variant.items())
+            found.append(_contender(block, variant, f"{block.name} {label}"))
+    return found
+
+
+def with_real_parameters(names: Sequence[str] = ()) -> list[Contender]:
+    """The same estimators with parameters for real recordings; as they are where no others are known."""
+    return [_contender(block, FOR_REAL_RECORDINGS.get(block.name, {})) for block in _blocks(names)]
+
+
+def _blocks(names: Sequence[str]) -> list[SampledBlock]:
+    six_axis = {block.name: block for block in _of_tilt() if block.name not in _TILT_OF_ANOTHER}
+    unknown = [name for name in names if name not in six_axis]
+    if unknown:
+        raise ValueError(
+            f"no estimator of tilt from gyro and accel is called {', '.join(map(repr, unknown))}; "
+            f"there is {', '.join(six_axis)}"
+        )
+    return [six_axis[name] for name in dict.fromkeys(names)] or list(six_axis.values())
+
+
+def with_magnetometer() -> list[Contender]:
+    """The estimators of heading, with parameters for real recordings: North is where the field points."""
+    return [
+        _contender(block, _FIELD_OF_THE_RECORDING.get(block.name, {})) for block in _of_tilt() if MAG in block.inputs
+    ]
+
+
+def _of_tilt() -> list[SampledBlock]:
+    return [
+        block
+        for block in ESTIMATORS
+        if isinstance(block, SampledBlock) and {GYRO, ACCEL} <= set(block.inputs) and VERTICAL in block.outputs
+    ]
+
+
+def _contender(block: SampledBlock, parameters: Mapping[str, Any], name: str = "") -> Contender:
+    finds_bias = any(signal.name == "gyro_bias" for signal in block.outputs)
+    return Contender(name or block.name, partial(_estimate, block, parameters), parameters, finds_bias)
+
+
+def _estimate(
+    block: SampledBlock, parameters: Mapping[str, Any], readings: Readings, sample_period: float
+) -> Mapping[str, np.ndarray]:
+    inputs = {signal.name: readings[signal.name] for signal in block.inputs if signal.name in readings}
+    return run(block, inputs, {"sample_period": sample_period, **parameters}).values

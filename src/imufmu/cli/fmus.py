@@ -1,0 +1,76 @@
+"""The verbs about single FMUs: build, doctor, info."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from ..scoring.table import Table
+from .console import out, print_table, progress_bar
+
+
+def build(
+    names: Annotated[list[str], typer.Argument(help="Names of blocks (see: imufmu list), or: all")],
+    folder: Annotated[Path, typer.Option("--folder", "-f", help="Where the FMUs go.")] = Path(),
+    native: Annotated[bool, typer.Option("--native", help="Compiled C, which needs no Python where it runs.")] = False,
+    platforms: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--platform", "-p", help="With --native: a platform inside, or: all. Repeatable. Default: this one."
+        ),
+    ] = None,
+) -> None:
+    """Write FMUs, in Python or as native code.
+
+    \b
+      imufmu build lee2012
+      imufmu build all --folder fmus
+      imufmu build lee2012 --native
+      imufmu build lee2012 --native --platform all        needs: pip install "imufmu[native]"
+      imufmu build imu+lee2012 --native                   both in series, as one FMU
+    """
+    from ..compiled.compilers import PLATFORMS
+    from ..fmi.build import build_fmu
+    from ..fmi.native import build_native
+    from ..registry import BLOCKS
+
+    if platforms and not native:
+        raise typer.BadParameter("give it together with --native", param_hint="--platform")
+    for name in BLOCKS if names == ["all"] else names:
+        if native:
+            with progress_bar(f"compiling {name}") as progress:
+                path = build_native(name, folder, [*PLATFORMS] if platforms == ["all"] else platforms, progress)
+        else:
+            path = build_fmu(name, folder)
+        out.print(str(path))
+
+
+def doctor(fmu: Annotated[Path, typer.Argument(help="An .fmu file")]) -> None:
+    """Say whether and where an FMU will run, and try one step of it. Exit code 1 if something is wrong.
+
+    \b
+      imufmu doctor lee2012.fmu
+    """
+    from ..fmi.doctor import Level, examine
+
+    findings = examine(fmu)
+    print_table(Table(["", "what", "finding"], [[f.level.value, f.topic, f.text] for f in findings], words=True))
+    if any(finding.level is Level.PROBLEM for finding in findings):
+        raise typer.Exit(1)
+
+
+def info(fmu: Annotated[str, typer.Argument(help="Name of a block, or an .fmu file")]) -> None:
+    """Variables, parameters and platforms of an FMU.
+
+    \b
+      imufmu info lee2012
+      imufmu info plant.fmu
+    """
+    from ..fmi.info import COLUMNS, describe
+
+    heading, rows = describe(fmu)
+    for line in heading:
+        out.print(line, markup=False)
+    print_table(Table(COLUMNS, rows, words=True))

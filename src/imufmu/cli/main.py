@@ -1,0 +1,88 @@
+"""Command line: thin verbs over public functions. Exit codes: 0 success, 1 a finding, 2 wrong usage or input."""
+
+from __future__ import annotations
+
+import sys
+from typing import Annotated
+
+import typer
+
+from .. import __version__
+from .console import err, out
+from .fmus import build, doctor, info
+from .runs import demo, pack, replay, run
+from .speed import speed
+from .verdicts import benchmark, predict, validate
+
+EXAMPLES = """IMU attitude estimators as drop-in FMUs, with the plants and IMU models to test them.
+
+\b
+  imufmu demo                                   pendulum, IMU and lee2012: table, figure, report
+  imufmu list                                   blocks, systems, devices
+  imufmu build lee2012                          writes lee2012.fmu
+  imufmu build lee2012 --native                 the same without Python inside
+  imufmu info lee2012.fmu                       what is inside
+  imufmu doctor lee2012.fmu                     whether and where it runs
+  imufmu run pendulum_lee2012 --set lee2012.mode=3 --plot
+  imufmu run pendulum_swing_up --report swing_up.html --animate swing_up.gif
+  imufmu replay walk.csv --estimator lee2012 --set c_a=0.2 --output tilt.csv
+  imufmu pack pendulum_lee2012 pendulum.ssp     for other tools
+  imufmu validate --junit verdict.xml           do the papers' conclusions hold?
+  imufmu benchmark broad                        every filter on a folder of recordings
+  imufmu speed                                  what a sample costs, native and in Python
+  imufmu predict --imu mtx --slosh 1            how well this gyroscope can know the vertical
+
+Exit codes: 0 success, 1 a finding (a criterion not met, a simulation failed), 2 wrong usage or input.
+"""
+
+app = typer.Typer(
+    help=EXAMPLES, no_args_is_help=True, add_completion=False, rich_markup_mode=None, pretty_exceptions_enable=False
+)
+
+
+@app.callback(invoke_without_command=True)
+def _root(version: Annotated[bool, typer.Option("--version", help="Print the version.")] = False) -> None:
+    if version:
+        out.print(f"imufmu {__version__}")
+        raise typer.Exit
+
+
+@app.command("list")
+def list_() -> None:
+    """What there is: blocks, systems, devices.
+
+    \b
+      imufmu list
+    """
+    from ..cosim.description import read_description
+    from ..files.locations import models_folder
+    from ..registry import ESTIMATORS, PLANTS, SENSORS
+
+    for kind, blocks in (("estimator", ESTIMATORS), ("sensor", SENSORS), ("plant", PLANTS)):
+        for block in blocks:
+            out.print(f"{kind:10} {block.name:32} {block.summary}")
+    for path in sorted(models_folder().rglob("*.ssd")):
+        out.print(f"{'system':10} {path.stem:32} {read_description(path).description}")
+    for path in sorted((models_folder() / "imus").glob("*.ssv")):
+        out.print(f"{'device':10} {path.stem:32} parameter set of the sensor imu: {path}")
+
+
+for verb in (build, doctor, info, run, replay, pack, demo, validate, benchmark, speed, predict):
+    app.command()(verb)
+
+
+def main() -> None:
+    """Entry point: errors of the user become one line, never a stack trace."""
+    from ..cosim.slave import SimulationError
+
+    try:
+        app()
+    except KeyboardInterrupt:
+        err.print("interrupted")
+        sys.exit(130)
+    except SimulationError as error:
+        err.print(f"error: {error}", markup=False)
+        sys.exit(1)
+    except (ValueError, OSError) as error:
+        err.print(f"error: {error}", markup=False)
+        sys.exit(2)

@@ -1,0 +1,158 @@
+"""The verbs that run something: run, replay, pack, demo."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from .arguments import check_target, parsed_sets
+from .console import notes, out, print_table, progress_bar, written
+
+Sets = Annotated[
+    list[str] | None,
+    typer.Option("--set", metavar="NAME=VALUE", help="Parameter value; a vector as 1,2,3. Repeatable."),
+]
+Output = Annotated[Path | None, typer.Option("--output", "-o", help="Write the results to this .csv or .h5 file.")]
+Native = Annotated[bool, typer.Option("--native", help="Our blocks as compiled C instead of Python.")]
+Plot = Annotated[bool, typer.Option("--plot", help="Write a figure next to the working folder's other files.")]
+
+
+def run(
+    system: Annotated[str, typer.Argument(help="Name of a system (see: imufmu list), or an .ssd or .ssp file")],
+    sets: Sets = None,
+    stop: Annotated[float | None, typer.Option("--stop", help="Stop time (s).")] = None,
+    step: Annotated[float | None, typer.Option("--step", help="Communication step (s).")] = None,
+    jacobi: Annotated[
+        bool, typer.Option("--jacobi", help="Take all inputs before the step, as simple masters do.")
+    ] = False,
+    native: Native = False,
+    output: Output = None,
+    plot: Plot = False,
+    report: Annotated[Path | None, typer.Option("--report", help="Write an HTML report to this file.")] = None,
+    animation: Annotated[
+        Path | None,
+        typer.Option("--animate", help="Draw the body and the estimated horizons into this .gif or .mp4 file."),
+    ] = None,
+) -> None:
+    """Co-simulate a system of FMUs and compare its estimators with its plant.
+
+    \b
+      imufmu run pendulum_lee2012
+      imufmu run pendulum_lee2012 --set lee2012.mode=3 --set imu.seed=7 --plot
+      imufmu run pendulum_swing_up --report swing_up.html --animate swing_up.gif
+      imufmu run my_system.ssd --stop 60 --step 0.005 --output run.csv
+
+    The heading counts from East: an estimator without a magnetometer keeps what it does not know at the start.
+    With --report or --animate the results also hold the points of the body, where the plant has the local variable
+    skeleton.
+    """
+    from ..cosim.master import simulate
+    from ..cosim.system import System, locate
+    from ..pictures.bodies import recorded
+    from ..reports.present import animate, check_pictures, present_run
+
+    check_target(output, ".csv", ".h5")
+    check_target(report, ".html")
+    check_target(animation, ".gif", ".mp4")
+    read = System.read(locate(system), native=native)
+    check_pictures(read, plot, report, animation)
+    with progress_bar(f"running {read.description.name}") as progress:
+        result = simulate(
+            read,
+            stop_time=stop,
+            step=step,
+            parameters=parsed_sets(sets),
+            record=recorded(read) if report or animation else None,
+            jacobi=jacobi,
+            progress=progress,
+        )
+    figure = Path(f"{read.description.name}.png") if plot else None
+    notes(result.notes)
+    print_table(present_run(result, figure, report))
+    if output:
+        (result.to_csv if output.suffix.lower() == ".csv" else result.to_hdf5)(output)
+    if animation:
+        with progress_bar(f"drawing {animation.name}") as progress:
+            notes(animate(result, animation, progress))
+    written(output, figure, report, animation)
+
+
+def replay(
+    recording: Annotated[Path, typer.Argument(help="Recording: .csv in SI units, or a BROAD .mat file")],
+    estimator: Annotated[
+        str, typer.Option("--estimator", "-e", help="Name of an estimator, or an .fmu file.")
+    ] = "lee2012",
+    sets: Sets = None,
+    native: Native = False,
+    output: Output = None,
+    local_variables: Annotated[bool, typer.Option("--locals", help="Also write the FMU's local variables.")] = False,
+    plot: Plot = False,
+) -> None:
+    """Feed a recording to an estimator FMU, one step per sample.
+
+    \b
+      imufmu replay walk.csv --estimator lee2012 --set c_a=0.2 --output tilt.csv --plot
+      imufmu replay 01_undisturbed_slow_rotation_A.mat --estimator my_filter.fmu
+
+    A CSV file names its columns time, gyro[1], gyro[2], gyro[3], accel[1], accel[2], accel[3] and, where there are
+    such, mag[1], mag[2], mag[3] and the truth: roll, pitch, yaw or q_NS[1] to q_NS[4]. Units: s, rad/s, m/s2, uT, rad.
+    With a truth the errors are printed.
+    """
+    from ..cosim.replay import estimator_fmu
+    from ..cosim.replay import replay as replay_recording
+    from ..recordings.reading import read
+    from ..reports.present import present_replay
+
+    check_target(output, ".csv")
+    read_recording = read(recording)
+    with progress_bar(f"replaying {read_recording.name}") as progress:
+        result = replay_recording(
+            read_recording,
+            estimator_fmu(estimator, native=native),
+            parsed_sets(sets),
+            local_variables=local_variables,
+            progress=progress,
+        )
+    figure = Path(f"{read_recording.name}_{result.estimator}.png") if plot else None
+    notes(result.notes)
+    print_table(present_replay(result, figure))
+    if output:
+        result.to_csv(output)
+    written(output, figure)
+
+
+def pack(
+    system: Annotated[str, typer.Argument(help="Name of a system, or an .ssd file")],
+    target: Annotated[Path, typer.Argument(help="The .ssp file to write")],
+    native: Native = False,
+) -> None:
+    """Write a system, its FMUs and its parameters as one .ssp file for other tools.
+
+    \b
+      imufmu pack pendulum_lee2012 pendulum.ssp
+      imufmu pack pendulum_lee2012 pendulum.ssp --native      for tools without Python, on this platform
+    """
+    from ..cosim.packing import pack as pack_system
+    from ..cosim.system import locate
+
+    check_target(target, ".ssp")
+    pack_system(locate(system), target, native=native)
+    out.print(str(target))
+
+
+def demo(
+    folder: Annotated[Path, typer.Option("--folder", "-f", help="Where figure and report go.")] = Path("imufmu-demo"),
+) -> None:
+    """Co-simulate a pendulum, an IMU and lee2012 in its three modes.
+
+    \b
+      imufmu demo
+    """
+    from ..reports.demo import run_demo
+
+    with progress_bar("co-simulating the demo") as progress:
+        made = run_demo(folder, progress)
+    print_table(made.table)
+    written(made.figure, made.report)

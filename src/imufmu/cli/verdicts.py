@@ -1,0 +1,113 @@
+"""The verbs that judge filters: validate, benchmark, predict."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from .arguments import check_target
+from .console import notes, out, print_table, progress_bar, written
+
+
+def validate(
+    papers: Annotated[list[str] | None, typer.Argument(help="Papers, by the names of their estimators; or all")] = None,
+    quick: Annotated[bool, typer.Option("--quick", help="Fewer random motions: two minutes instead of ten.")] = False,
+    report: Annotated[Path | None, typer.Option("--report", help="Write an HTML report to this file.")] = None,
+    junit: Annotated[
+        Path | None, typer.Option("--junit", help="Write the checks to this .xml file, for a CI server.")
+    ] = None,
+    json: Annotated[
+        Path | None, typer.Option("--json", help="Write everything but figures to this .json file.")
+    ] = None,
+) -> None:
+    """Do the papers' experiments again and check their conclusions; exit code 1 if a criterion is not met.
+
+    \b
+      imufmu validate
+      imufmu validate lee2012 rizun2008 --quick
+      imufmu validate --report verdict.html --junit verdict.xml --json verdict.json
+    """
+    from ..papers.junit import write_junit
+    from ..papers.validate import validate as run_experiments
+    from ..papers.verdicts import failure_table, verdict_table, write_json, write_page
+
+    check_target(report, ".html")
+    check_target(junit, ".xml")
+    check_target(json, ".json")
+    with progress_bar("the papers' experiments") as progress:
+        verdicts = run_experiments(papers or (), quick=quick, drawn=report is not None, progress=progress)
+    print_table(verdict_table(verdicts))
+    for verdict in verdicts:
+        for remark in verdict.remarks:
+            out.print(f"remark on {verdict.name}: {remark}", markup=False)
+    failures = failure_table(verdicts)
+    if failures:
+        print_table(failures)
+    if report:
+        write_page(report, verdicts, quick)
+    if junit:
+        write_junit(junit, verdicts)
+    if json:
+        write_json(json, verdicts, quick)
+    written(report, junit, json)
+    if failures:
+        raise typer.Exit(1)
+
+
+def benchmark(
+    folder: Annotated[Path, typer.Argument(help="Folder with recordings that know the truth: .csv, or .mat of BROAD")],
+    estimators: Annotated[
+        list[str] | None, typer.Option("--estimator", "-e", help="Name of an estimator; all without. Repeatable.")
+    ] = None,
+    delay: Annotated[
+        float, typer.Option(min=-1.0, max=1.0, help="Score once more with the truth delayed by this (s).")
+    ] = 0.0023,
+    rest_bias: Annotated[
+        float, typer.Option(min=0.0, help="Rest at the start (s) whose mean gyro the second contest removes; 0: none.")
+    ] = 3.0,
+    csv: Annotated[Path | None, typer.Option("--csv", help="Write every score to this .csv file.")] = None,
+) -> None:
+    """Score every estimator of tilt on real recordings, beside VQF and imufusion where those are installed.
+
+    \b
+      imufmu benchmark broad
+      imufmu benchmark broad --estimator rizun2008 --delay 0 --csv scores.csv
+
+    Twice: with the parameters of the papers, then with parameters for real recordings. For the columns of a .csv file
+    see imufmu replay --help.
+    """
+    from ..benchmarks.recordings import benchmark as score
+    from ..benchmarks.recordings import tables, write_scores
+
+    check_target(csv, ".csv")
+    with progress_bar(f"scoring {folder}") as progress:
+        result = score(folder, estimators or (), delay=delay, rest=rest_bias, progress=progress)
+    notes(result.notes)
+    for section in tables(result):
+        out.print(section.heading, markup=False)
+        for point in section.points:
+            out.print(f"  {point}", markup=False)
+        if section.table:
+            print_table(section.table)
+        out.print()
+    if csv:
+        write_scores(csv, result)
+    written(csv)
+
+
+def predict(
+    imu: Annotated[str, typer.Option("--imu", help="Device (see: imufmu list), or an .ssv file.")] = "mtx",
+    slosh: Annotated[float, typer.Option("--slosh", help="Density of the sensor's velocity (m/s/sqrt(Hz)).")] = 1.0,
+) -> None:
+    """How well this gyroscope can know the vertical in this motion, from the error formulas of Rizun 2008.
+
+    \b
+      imufmu predict --imu mtx --slosh 1.0
+
+    A slosh of 1 m/s/sqrt(Hz) is that of a shoe in running.
+    """
+    from ..scoring.prediction import predict as expected
+
+    print_table(expected(imu, slosh))

@@ -1,0 +1,1 @@
+"""From a block to C, and from C to libraries and programs."""

@@ -1,0 +1,82 @@
+"""Covariance of the errors of ``plumb``: its prediction over a block, and the measurements at the end of one.
+
+The equation numbers are those of ``block_end``. P is 18 x 18 and symmetric. Its prediction is written out for the
+rows that change, psi and dv: a product with the whole transition matrix would mostly multiply by 0 and 1.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from types import SimpleNamespace
+from typing import Any
+
+import casadi as ca
+
+from ...blocks.rotations import matrix_from_quaternion, skew
+from ..kalman import update
+
+PSI, V, B, D = (slice(0, 3), slice(3, 6), slice(6, 9), slice(9, 18))
+N_ERRORS = 18
+LARGEST_VARIANCE = 1.0  # rad2 of psi, rad2/s2 of b
+
+I3 = ca.SX.eye(3)
+
+
+def predicted(P: Any, S: Any, x: SimpleNamespace, H: Any, p: SimpleNamespace) -> Any:
+    """Covariance at the end of a block, from that at its beginning."""
+    R, minus_dV, theta = matrix_from_quaternion(x.q), -skew(x.dV), x.theta / H
+    psi = P[PSI, :] + S @ of_rate(P, theta)  # (5): covariance of psi' with every error at the beginning
+    dv = P[V, :] + minus_dV @ P[PSI, :]  # (5): the same of dv'
+    P = ca.SX(P)
+    P[V, V] = dv[:, V] + dv[:, PSI] @ minus_dV.T
+    P[PSI, V] = psi[:, V] + psi[:, PSI] @ minus_dV.T
+    P[PSI, PSI] = psi[:, PSI] + of_rate(psi.T, theta).T @ S.T
+    P[PSI, 6:], P[V, 6:] = psi[:, 6:], dv[:, 6:]
+    W = H * p.k_g**2 * theta @ theta.T + p.s_s**2 * ca.diag(x.blind)  # (6)
+    P[PSI, PSI] += p.s_g**2 * H * I3 + R @ W @ R.T  # (6)
+    P[V, V] += (p.s_a**2 * H + p.s_m**2 * (H - x.T)) * I3  # (6)
+    P[B, B] += p.s_b**2 * H * I3  # (6)
+    return bounded(ca.triu2symm(ca.triu(P)))
+
+
+def of_rate(P: Any, theta: Any) -> Any:
+    """Covariance of the error of the mean rate, dD theta / H - db, with what the columns of P stand for."""
+    return ca.vertcat(*(theta.T @ P[row : row + 3, :] for row in (9, 12, 15))) - P[B, :]
+
+
+def bounded(P: Any) -> Any:
+    """P with no more than LARGEST_VARIANCE for psi and b: the correlations stay."""
+    scale = ca.SX.ones(N_ERRORS)
+    for i in (*range(N_ERRORS)[PSI], *range(N_ERRORS)[B]):
+        scale[i] = ca.if_else(P[i, i] > LARGEST_VARIANCE, ca.sqrt(LARGEST_VARIANCE / P[i, i]), 1)
+    return P * (scale @ scale.T)
+
+
+def measure(error: Any, P: Any, part: slice, values: Sequence[Any], variance: Any) -> tuple[Any, Any]:
+    """Errors and covariance after measurements of the three errors ``part``, one after the other."""
+    for i, value in zip(range(N_ERRORS)[part], values, strict=True):
+        error, P = update(error, P, {i: 1}, value, variance)
+    return error, P
+
+
+def forgotten(P: Any, condition: Any, variance: Any = 0) -> Any:
+    """P; where the condition holds, with errors of v of this variance that are independent of all others."""
+    keep = ca.SX.ones(N_ERRORS)
+    keep[V] = 1 - condition
+    P = P * (keep @ keep.T)
+    P[V, V] += condition * variance * I3
+    return P
+
+
+def upper_triangle(P: Any) -> Any:
+    """Upper triangle of a matrix, flat, row by row."""
+    return ca.vertcat(*(P[i, j] for i in range(N_ERRORS) for j in range(i, N_ERRORS)))
+
+
+def full(triangle: Any) -> Any:
+    """Symmetric matrix of an upper triangle."""
+    P, elements = ca.SX(N_ERRORS, N_ERRORS), iter(ca.vertsplit(triangle))
+    for i in range(N_ERRORS):
+        for j in range(i, N_ERRORS):
+            P[i, j] = P[j, i] = next(elements)
+    return P

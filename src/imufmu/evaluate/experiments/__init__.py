@@ -1,1 +1,0 @@
-"""The papers' own experiments, one module each; imufmu.evaluate.validate lists and runs them."""

@@ -1,0 +1,1 @@
+"""Files on disk: whole or not at all, archives that may be hostile, tables, and where our own lie."""

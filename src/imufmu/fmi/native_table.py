@@ -1,0 +1,83 @@
+"""The part of a native FMU's C that only an FMU needs: its table of variables, sizes and names for the wrapper."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+from jinja2 import Environment, PackageLoader, StrictUndefined
+
+from .. import __version__
+from ..blocks.block import Block, ContinuousBlock, SampledBlock, Variable
+from ..blocks.instance import CLOCK_TOLERANCE, LONGEST_STEP
+from ..blocks.signals import Parameter, total_size
+from ..compiled.equations import equations, functions_of
+from .model_description import guid, value_references, variable_type
+
+
+def generate(block: Block) -> dict[str, str]:
+    """Text by file name: ``block.c`` and ``equations.c``."""
+    functions = functions_of(block)
+    return {"block.c": _table(block, functions), "equations.c": equations(block, functions)}
+
+
+def _table(block: Block, functions: dict[str, Any]) -> str:
+    environment = Environment(
+        loader=PackageLoader("imufmu.fmi"), undefined=StrictUndefined, trim_blocks=True, keep_trailing_newline=True
+    )
+    references = {variable.name: reference for reference, variable in value_references(block)}
+    return environment.get_template("block.c").render(
+        block=block,
+        version=__version__,
+        guid=guid(block, native=True),
+        constants=_constants(block, functions, references),
+        streams=[(references[name], width) for name, width in block.seeds],
+        aliases={alias: function.name() for alias, function in functions.items()},
+        variables=[_row(variable) for _, variable in sorted(value_references(block), key=lambda listed: listed[0])],
+        c_string=json.dumps,  # the names and units are plain ASCII, which both languages quote alike
+    )
+
+
+def _constants(block: Block, functions: dict[str, Any], references: dict[str, int]) -> dict[str, Any]:
+    """Sizes, places and limits; a place is a value reference."""
+    sampled, needs = isinstance(block, SampledBlock), list(functions.values())
+    assert isinstance(block, SampledBlock | ContinuousBlock)
+    return {
+        "SAMPLED": int(sampled),
+        "N_VARIABLES": len(references),
+        "N_INPUTS": total_size(block.inputs),
+        "N_PARAMETERS": total_size(block.parameters),
+        "N_OUTPUTS": total_size(block.outputs),
+        "N_REPORTED": total_size(block.reported),
+        "N_STATE": total_size(block.held_state),
+        "N_HELD": total_size(block.inputs),  # the last of the state
+        "HAS_SOLVER": int(block.has_solver),
+        "SLOW_STEPS": int("block_slow" in functions),
+        "N_FAST": functions["block_step"].numel_out(0) if "block_step" in functions else total_size(block.state),
+        "N_NORMALS": block.normals,
+        "N_ARGUMENTS": max(function.sz_arg() for function in needs),
+        "N_RESULTS": max(function.sz_res() for function in needs),
+        "N_WORK": max(function.sz_w() for function in needs),
+        "N_INTEGER_WORK": max(function.sz_iw() for function in needs),
+        "PERIOD": references["sample_period" if sampled else "max_step"],
+        "SAMPLE_TIME": references.get("sample_time", len(references)),  # a continuous block has none
+        "CLOCK_TOLERANCE": repr(CLOCK_TOLERANCE),
+        "LONGEST_STEP": repr(float(LONGEST_STEP)),
+    }
+
+
+def _row(variable: Variable) -> dict[str, str]:
+    """One line of the table; numbers read back as the same double."""
+    signal = variable.signal
+    role = variable.group.upper()
+    if isinstance(signal, Parameter):
+        role = "TUNABLE" if signal.tunable else "FIXED"
+    return {
+        "name": variable.name,
+        "unit": "" if signal.unit == "1" else f" {signal.unit}",
+        "type": variable_type(variable).upper(),
+        "role": role,
+        "start": repr(float(variable.start)),
+        "minimum": repr(float(signal.minimum)),
+        "maximum": repr(float(signal.maximum)),
+    }

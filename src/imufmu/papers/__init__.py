@@ -1,0 +1,1 @@
+"""The papers' experiments, one folder each, and the verdict on their conclusions."""

@@ -1,0 +1,1 @@
+"""Figures, bodies, horizons and movies."""

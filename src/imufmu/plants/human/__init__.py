@@ -1,0 +1,5 @@
+"""A sensor on a moving person: body, gait, activities."""
+
+from .plant import BLOCK
+
+__all__ = ["BLOCK"]

@@ -1,0 +1,1 @@
+"""Recordings of others: reading them, their units and their clocks."""

@@ -1,0 +1,76 @@
+"""Find truth and estimates in the results of a co-simulated system, and compare them.
+
+A component that reports a ``vertical`` knows an attitude. With a ``sample_time`` it is an estimator, without one it is
+a plant and tells the truth.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..blocks.running import Trajectory
+from ..cosim.results import Result
+from . import metrics
+
+_COMPARED = ("vertical", "roll", "pitch", "yaw", "q_NS", "external_acceleration", "sample_time", "tilt_std")
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Truth and estimates of one run at the estimators' own instants.
+
+    truth, estimate: trajectories with equal time. errors: over time, as metrics.errors gives them. summary: figures by
+    name with the unit in the name. delay: s, from the instant of a sample to the row that first holds its outputs, in
+    the mean.
+    """
+
+    component: str
+    truth: Trajectory
+    estimate: Trajectory
+    errors: dict[str, np.ndarray]
+    summary: dict[str, float]
+    delay: float
+
+
+def comparisons(result: Result) -> list[Comparison]:
+    """One comparison per estimator; empty without a truth or an estimator. Raises ValueError with two truths."""
+    plants, estimators = knowing(result.names)
+    if not plants or not estimators:
+        return []
+    if len(plants) > 1:
+        raise ValueError(f"the system has several plants ({', '.join(plants)}): which one tells the truth is unclear")
+    return [_compare(result, plants[0], component) for component in estimators]
+
+
+def knowing(names: Iterable[str]) -> tuple[list[str], list[str]]:
+    """Plants that tell the truth and estimators among the components with these variables, in their order."""
+    known = list(names)
+    attitudes = [name.removesuffix(".vertical[1]") for name in known if name.endswith(".vertical[1]")]
+    estimators = [component for component in attitudes if f"{component}.sample_time" in known]
+    return [component for component in attitudes if component not in estimators], estimators
+
+
+def _compare(result: Result, plant: str, component: str) -> Comparison:
+    estimate, truth = _signals(result, component), _signals(result, plant)
+    instants = np.unique(estimate["sample_time"])
+    period = float(np.median(np.diff(instants))) if len(instants) > 1 else 1.0
+    rows_hat, rows = metrics.equal_instants(estimate["sample_time"], result.time, period)
+    at_samples = metrics.at_rows(estimate, rows_hat)
+    true_then = metrics.at_rows(truth, rows)
+    errors = metrics.errors(at_samples, true_then)
+    time = result.time[rows]
+    return Comparison(
+        component,
+        Trajectory(time, true_then),
+        Trajectory(time, at_samples),
+        errors,
+        metrics.summary(errors),
+        float(np.mean(result.time[rows_hat] - at_samples["sample_time"])),
+    )
+
+
+def _signals(result: Result, component: str) -> dict[str, np.ndarray]:
+    return {name: result[f"{component}.{name}"] for name in _COMPARED if f"{component}.{name}" in result}

@@ -1,0 +1,210 @@
+"""Archives and XML from anywhere: opened whole, or refused with one message and nothing done."""
+
+from __future__ import annotations
+
+import stat
+import zipfile
+from pathlib import Path
+
+import fmpy
+import pytest
+
+from imufmu.files import archives
+from imufmu.files.archives import ArchiveError, check_xml, open_fmu, parse_xml, read_fmu, unpack
+from support.cosim_stubs import LIBRARY, fake_fmu, model_description, stub, variable, write_zip
+
+
+def refusal(path: Path, folder: Path) -> str:
+    """The message of the refusal, which must leave the folder empty."""
+    folder.mkdir(exist_ok=True)
+    with pytest.raises(ArchiveError) as caught:
+        unpack(path, folder)
+    assert list(folder.iterdir()) == []
+    assert str(path) in str(caught.value)
+    return str(caught.value)
+
+
+def test_a_harmless_archive_is_unpacked_whole(tmp_path: Path) -> None:
+    archive = write_zip(tmp_path / "a.ssp", {"a.txt": "one", "deep/er/b.txt": "two"})
+    target = tmp_path / "target"
+    target.mkdir()
+    unpack(archive, target)
+    assert (target / "a.txt").read_text() == "one"
+    assert (target / "deep/er/b.txt").read_text() == "two"
+
+
+@pytest.mark.parametrize(
+    ("name", "reason"),
+    [
+        ("../evil.txt", "leaves the archive"),
+        ("a/../../evil.txt", "leaves the archive"),
+        ("/evil.txt", "absolute"),
+        ("C:/evil.txt", "absolute"),
+        ("C:evil.txt", "absolute"),
+        ("..\\evil.txt", "backslash"),
+        ("a\\b.txt", "backslash"),
+        ("\\\\server\\share\\evil.txt", "backslash"),
+        ("evil\x00.txt", "cannot be printed"),
+        ("evil\n.txt", "cannot be printed"),
+    ],
+)
+def test_a_member_with_a_dangerous_name_is_refused_by_name(tmp_path: Path, name: str, reason: str) -> None:
+    archive = tmp_path / "a.ssp"
+    with zipfile.ZipFile(archive, "w") as writer:
+        entry = zipfile.ZipInfo("x" * len(name))
+        writer.writestr("good.txt", "good")
+        writer.writestr(entry, "evil")
+    # ZipInfo tidies names: put the dangerous one in afterwards, in both places where a zip holds it.
+    archive.write_bytes(archive.read_bytes().replace(b"x" * len(name), name.encode()))
+    message = refusal(archive, tmp_path / "target")
+    assert reason in message
+    assert repr(name) in message
+    assert not (tmp_path / "evil.txt").exists()
+
+
+def test_links_special_files_and_repeated_names_are_refused(tmp_path: Path) -> None:
+    for kind in (stat.S_IFLNK, stat.S_IFIFO):
+        entry = zipfile.ZipInfo("link")
+        entry.external_attr = (kind | 0o777) << 16
+        with zipfile.ZipFile(tmp_path / "a.ssp", "w") as writer:
+            writer.writestr(entry, "/etc/passwd")
+        assert "link or special file" in refusal(tmp_path / "a.ssp", tmp_path / "target")
+    with zipfile.ZipFile(tmp_path / "b.ssp", "w") as writer, pytest.warns(UserWarning, match="Duplicate"):
+        writer.writestr("same", "one")
+        writer.writestr("same", "two")
+    assert "twice" in refusal(tmp_path / "b.ssp", tmp_path / "target")
+
+
+def test_an_encrypted_member_is_refused(tmp_path: Path) -> None:
+    archive = write_zip(tmp_path / "a.ssp", {"secret": "x"})
+    content = bytearray(archive.read_bytes())
+    for header, flags in ((b"PK\x03\x04", 6), (b"PK\x01\x02", 8)):  # where each header of a member says so
+        content[content.index(header) + flags] |= 1
+    archive.write_bytes(content)
+    assert "member 'secret' refused: encrypted" in refusal(archive, tmp_path / "target")
+
+
+def test_a_zip_bomb_is_refused_by_its_declared_size(tmp_path: Path) -> None:
+    bomb = tmp_path / "bomb.ssp"
+    with zipfile.ZipFile(bomb, "w", zipfile.ZIP_DEFLATED) as writer, writer.open("zeros", "w") as member:
+        for _ in range(65):
+            member.write(bytes(2**20))
+    assert "unpacks to 68,157,440 bytes" in refusal(bomb, tmp_path / "target")
+
+
+def test_an_archive_of_countless_members_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(archives, "MOST_MEMBERS", 2)
+    archive = write_zip(tmp_path / "a.ssp", {"a": "", "b": "", "c": ""})
+    assert "3 members" in refusal(archive, tmp_path / "target")
+
+
+def test_every_truncation_is_refused(tmp_path: Path) -> None:
+    whole = fake_fmu(tmp_path / "whole.fmu", [variable("y", "output")]).read_bytes()
+    cut = tmp_path / "cut.fmu"
+    for length in range(0, len(whole) - 1, 37):
+        cut.write_bytes(whole[:length])
+        assert "not a zip archive" in refusal(cut, tmp_path / "target")
+
+
+def test_damage_anywhere_is_an_archive_error_or_harmless(tmp_path: Path) -> None:
+    whole = fake_fmu(tmp_path / "whole.fmu", [variable("y", "output")]).read_bytes()
+    damaged = tmp_path / "damaged.fmu"
+    for at in range(0, len(whole), 3):
+        damaged.write_bytes(whole[:at] + bytes([whole[at] ^ 0xFF]) + whole[at + 1 :])
+        try:
+            read_fmu(damaged)
+        except ArchiveError as error:
+            assert str(damaged) in str(error)
+
+
+def test_what_is_no_archive_at_all_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "text.fmu").write_text("not a zip")
+    for path, reason in ((tmp_path / "none.fmu", "no such file"), (tmp_path / "text.fmu", "not a zip archive")):
+        with pytest.raises(ArchiveError, match=reason):
+            read_fmu(path)
+    with pytest.raises(ArchiveError, match="cannot be read"):
+        read_fmu(tmp_path)
+
+
+ENTITY_BOMB = b"""<?xml version="1.0"?>
+<!DOCTYPE a [<!ENTITY b "bbbbbbbbbb"><!ENTITY c "&b;&b;&b;&b;&b;&b;">]>
+<a>&c;</a>"""
+EXTERNAL_ENTITY = b'<!DOCTYPE a [<!ENTITY x SYSTEM "file:///etc/passwd">]><a>&x;</a>'
+REMOTE_SCHEMA = b'<!DOCTYPE a SYSTEM "http://example.invalid/a.dtd"><a/>'
+
+
+@pytest.mark.parametrize(
+    "content", [ENTITY_BOMB, EXTERNAL_ENTITY, REMOTE_SCHEMA, ENTITY_BOMB.decode().encode("utf-16")]
+)
+def test_xml_with_a_doctype_is_refused_before_it_is_expanded(content: bytes) -> None:
+    with pytest.raises(ArchiveError, match=r"model\.xml, line \d: a DOCTYPE is not allowed"):
+        check_xml(content, "model.xml")
+
+
+@pytest.mark.parametrize("content", [b"", b"<a>\n<b>\n</a>", b"<a/>\n\n<b/>", b"\xff\xff", b"<a>\n\n&lt</a>"])
+def test_malformed_xml_is_refused_with_its_line(content: bytes) -> None:
+    with pytest.raises(ArchiveError, match=r"model\.xml, line \d+: not well-formed"):
+        parse_xml(content, "model.xml")
+
+
+def test_an_fmu_is_opened_with_its_library_for_this_platform(tmp_path: Path) -> None:
+    library, description = open_fmu(stub("clock"), tmp_path)
+    assert library.parent == tmp_path / "binaries" / fmpy.platform
+    assert [v.name for v in description.modelVariables][:2] == ["u", "y"]
+
+
+def test_the_folder_that_names_the_processor_is_preferred(tmp_path: Path) -> None:
+    newer = LIBRARY.replace(fmpy.platform, fmpy.platform_tuple)
+    for members in ({newer: b""}, {newer: b"", LIBRARY: b""}):
+        path = write_zip(tmp_path / "a.fmu", {"modelDescription.xml": XML} | members)
+        folder = tmp_path / str(len(members))
+        folder.mkdir()
+        assert open_fmu(path, folder)[0] == folder / newer
+
+
+XML = model_description([variable("y", "output")])
+UNFIT = {
+    "no model description": ({LIBRARY: b""}, "modelDescription.xml is missing"),
+    "other root": ({"modelDescription.xml": "<a/>", LIBRARY: b""}, "no FMI model description: the root element is a"),
+    "FMI 3": ({"modelDescription.xml": XML.replace('"2.0"', '"3.0"'), LIBRARY: b""}, r"FMI 3\.0; expected FMI 2\.0"),
+    "FMI 1": ({"modelDescription.xml": XML.replace('"2.0"', '"1.0"'), LIBRARY: b""}, r"FMI 1\.0; expected FMI 2\.0"),
+    "model exchange": (
+        {"modelDescription.xml": XML.replace("<CoSimulation", "<ModelExchange"), LIBRARY: b""},
+        "for model exchange only",
+    ),
+    "schema": (
+        {"modelDescription.xml": XML.replace('causality="output"', 'causality="sideways"'), LIBRARY: b""},
+        "line .*sideways",
+    ),
+    "dangling reference": (
+        {"modelDescription.xml": XML.replace('index="1"', 'index="7"'), LIBRARY: b""},
+        "modelDescription.xml: ",
+    ),
+    "doctype": (
+        {"modelDescription.xml": XML.replace("<fmiModel", "<!DOCTYPE x><fmiModel", 1), LIBRARY: b""},
+        "modelDescription.xml, line 2: a DOCTYPE",
+    ),
+    "no binary": ({"modelDescription.xml": XML}, "no binary for this platform .* it holds none"),
+    "other platforms": (
+        {"modelDescription.xml": XML, "binaries/amiga/Fake.so": b"", "binaries/sun/Fake.so": b""},
+        "it holds amiga, sun",
+    ),
+    "other binary": (
+        {"modelDescription.xml": XML, LIBRARY.replace("Fake", "Other"): b""},
+        r"modelIdentifier 'Fake': expected Fake\.\w+, there is Other\.",
+    ),
+    "identifier that leaves its folder": (
+        {"modelDescription.xml": XML.replace('modelIdentifier="Fake"', 'modelIdentifier="../x"'), LIBRARY: b""},
+        "modelIdentifier '../x'",
+    ),
+}
+
+
+@pytest.mark.parametrize(("members", "reason"), UNFIT.values(), ids=UNFIT)
+def test_an_fmu_that_cannot_run_here_is_refused_with_the_reason(
+    tmp_path: Path, members: dict[str, bytes | str], reason: str
+) -> None:
+    path = write_zip(tmp_path / "a.fmu", members)
+    with pytest.raises(ArchiveError, match=reason) as caught:
+        read_fmu(path)
+    assert str(path) in str(caught.value)
