@@ -24,7 +24,7 @@ _FACE: dict[str, tuple[str, str]] = {
         "cosim.packing": {"pack": ""},
         "cosim.replay": {"Replay": "", "estimator_fmu": "", "replay": ""},
         "cosim.results": {"Result": "", "read_hdf5": ""},
-        "cosim.slave": {"SimulationError": ""},
+        "cosim.errors": {"SimulationError": ""},
         "cosim.system": {"System": "", "locate": ""},
         "files.archives": {"ArchiveError": ""},
         "fmi.build": {"build_fmu": ""},

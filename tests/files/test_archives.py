@@ -10,7 +10,8 @@ import fmpy
 import pytest
 
 from imufmu.files import archives
-from imufmu.files.archives import ArchiveError, check_xml, open_fmu, parse_xml, read_fmu, unpack
+from imufmu.files.archives import ArchiveError, check_xml, parse_xml, unpack
+from imufmu.fmi.archive import open_fmu, read_fmu
 from support.cosim_stubs import LIBRARY, fake_fmu, model_description, stub, variable, write_zip
 
 

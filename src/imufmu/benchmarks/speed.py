@@ -1,8 +1,8 @@
-"""What a sample costs, each way of running a block beside the others in one run; and what a system costs.
+"""What a sample costs, each way of running a block beside the others in one run; what a system costs, and a start.
 
-Samples are measured in processor time, systems in real time. The ways are measured in turn, and again, so that what
-else the machine does meets all of them. Each figure is the median of its measurements, a ratio that of the ratios
-within a turn.
+Samples and starts are measured in processor time, systems in real time. The ways are measured in turn, and again, so
+that what else the machine does meets all of them. Each figure is the median of its measurements, a ratio that of the
+ratios within a turn.
 """
 
 from __future__ import annotations
@@ -32,6 +32,7 @@ from ..papers.motions import parameter_set, record
 from ..plants import handheld
 from ..registry import BLOCKS
 from ..scoring.table import Table
+from .speed_start import StartTiming, start_timings
 from .speed_ways import NATIVE_IN_C, Trip, ways
 
 BLOCKS_BY_DEFAULT = ("lee2012", "plumb")
@@ -79,6 +80,7 @@ class Speed:
     machine: Mapping[str, str]
     timings: Sequence[Timing]
     systems: Sequence[SystemTiming]
+    starts: Sequence[StartTiming]
 
 
 def speed(
@@ -87,6 +89,7 @@ def speed(
     *,
     repeats: int = _REPEATS,
     with_system: bool = True,
+    with_starts: bool = True,
     progress: Progress | None = None,
 ) -> Speed:
     """Measure sampled blocks at their own sample period and at these rates (Hz), and a system of FMUs at 1 kHz.
@@ -96,7 +99,8 @@ def speed(
     """
     trips = [trip for name in names for trip in _trips(name, rates)]
     systems = _SYSTEM_REPEATS if with_system else 0
-    total = len(trips) * repeats + systems
+    starts = repeats if with_starts else 0
+    total = len(trips) * repeats + systems + starts
     done = 0
 
     def one_more() -> None:
@@ -106,7 +110,7 @@ def speed(
             progress(done, total)
 
     timings = [timing for trip in trips for timing in _measured(trip, repeats, one_more)]
-    return Speed(_machine(), timings, _system_timings(systems, one_more))
+    return Speed(_machine(), timings, _system_timings(systems, one_more), start_timings(starts, one_more))
 
 
 def _trips(name: str, rates: Sequence[float]) -> list[Trip]:
@@ -189,7 +193,7 @@ def _processor() -> str:
 
 
 def tables(result: Speed) -> list[Table]:
-    """What a sample costs, and what a system costs."""
+    """What a sample costs, what a system costs, and a start."""
     rows = [
         [t.block, f"{t.rate:.4g}", t.way, f"{1e9 * t.seconds:.0f}", f"{1e9 * t.least:.0f}", f"{t.ratio:.3g}"]
         for t in result.timings
@@ -200,7 +204,13 @@ def tables(result: Speed) -> list[Table]:
         for s in result.systems
     ]
     system_columns = ["system", "of", "rate (Hz)", "simulated (s)", "took (s)", "times real time"]
-    return [Table(columns, rows), *([Table(system_columns, systems)] if systems else [])]
+    starts = [[s.command, f"{1e3 * s.seconds:.0f}", f"{1e3 * s.least:.0f}"] for s in result.starts]
+    made = (
+        Table(columns, rows),
+        Table(system_columns, systems),
+        Table(["start", "processor time (ms)", "least (ms)"], starts),
+    )
+    return [table for table in made if table.rows]
 
 
 def write_json(path: Path, result: Speed) -> None:

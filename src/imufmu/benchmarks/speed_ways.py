@@ -27,9 +27,10 @@ from ..blocks.block import SampledBlock
 from ..blocks.running import Stream, run
 from ..blocks.signals import total_size
 from ..compiled.compilers import compile_program
-from ..cosim.slave import SimulationError, forget_paths
-from ..files.archives import open_fmu
+from ..cosim.errors import SimulationError
+from ..cosim.slave import forget_paths
 from ..files.locations import fmu_src_folder
+from ..fmi.archive import open_fmu
 from ..fmi.build import cached_fmu
 from ..fmi.native import cached_native_fmu
 

@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from .. import __version__
+from ..cosim.errors import SimulationError
 from .console import err, out
 from .fmus import build, doctor, info
 from .runs import demo, pack, replay, run
@@ -73,8 +74,6 @@ for verb in (build, doctor, info, run, replay, pack, demo, validate, benchmark, 
 
 def main() -> None:
     """Entry point: errors of the user become one line, never a stack trace."""
-    from ..cosim.slave import SimulationError
-
     try:
         app()
     except KeyboardInterrupt:

@@ -18,11 +18,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 from urllib.parse import unquote, urlparse
 
-import fmpy.ssp
 from lxml import etree
 
 from ..files.archives import parse_xml
@@ -180,7 +180,9 @@ def _validate(root: Any, schema: str, path: Path) -> None:
 
 @lru_cache
 def _schema(name: str) -> Any:
-    return etree.XMLSchema(file=str(Path(fmpy.ssp.__file__).parent / "schema" / f"{name}.xsd"))
+    found = find_spec("fmpy")  # to import it takes longer than to read a description
+    assert found and found.origin
+    return etree.XMLSchema(file=str(Path(found.origin).parent / "ssp" / "schema" / f"{name}.xsd"))
 
 
 def _component(element: Any, files: Sources) -> Component:

@@ -25,13 +25,14 @@ from typing import Any
 
 import numpy as np
 
-from ..files.archives import open_fmu
+from ..fmi.archive import open_fmu
+from .errors import SimulationError
 from .exchange import Exchange
 from .interrupt import interrupt_between_calls
 from .order import signal_flow
 from .results import Result
 from .settings import Setting
-from .slave import SimulationError, Slave, forget_paths
+from .slave import Slave, forget_paths
 from .system import Part, System, locate
 
 MOST_TICKS = 10**8  # more is taken for a wrong unit

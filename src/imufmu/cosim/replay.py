@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 
 from ..blocks.vocabulary import ACCEL, GYRO, MAG
-from ..files.archives import open_fmu
 from ..files.csv_table import write_csv
+from ..fmi.archive import open_fmu
 from ..fmi.build import cached_fmu
 from ..fmi.native import cached_native_fmu
 from ..recordings.reading import Recording, hold_missing

@@ -21,6 +21,7 @@ import numpy as np
 from fmpy.fmi1 import FMICallException
 from fmpy.fmi2 import FMU2Slave, fmi2Discard, fmi2Fatal, fmi2True, fmi2Warning
 
+from .errors import SimulationError
 from .messages import Messages
 from .settings import Setting
 
@@ -28,10 +29,6 @@ DTYPES: dict[str, Any] = {"Real": np.float64, "Integer": np.int32, "Boolean": np
 _POINTERS: dict[str, Any] = {"Real": POINTER(c_double), "Integer": POINTER(c_int), "Boolean": POINTER(c_int)}
 
 _Call = tuple[str, Callable[[], int]]  # name of an FMI function, and a call of it
-
-
-class SimulationError(RuntimeError):
-    """A run cannot go on; the message names component, call, time and what the FMU said."""
 
 
 @dataclass(frozen=True)

@@ -11,8 +11,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from ..files.archives import ArchiveError, read_fmu, unpack
+from ..files.archives import ArchiveError, unpack
 from ..files.locations import models_folder
+from ..fmi.archive import read_fmu
 from ..fmi.build import cached_fmu
 from ..fmi.native import cached_native_fmu
 from ..registry import BLOCKS

@@ -14,7 +14,8 @@ from typing import Any
 import fmpy
 from fmpy.validation import validate_fmu
 
-from ..files.archives import ArchiveError, fmu_members, read_members
+from ..files.archives import ArchiveError, read_members
+from .archive import fmu_members
 from .trial import HUNG, try_step
 
 _SYSTEMS = {"linux": ".so", "darwin": ".dylib", "win": ".dll"}  # the name darwin has a win in it

@@ -6,7 +6,7 @@ import zipfile
 from pathlib import Path
 
 from ..compiled.compilers import BuildError
-from ..files.archives import read_fmu
+from .archive import read_fmu
 
 COLUMNS = ("variable", "causality", "variability", "unit", "start", "min", "max", "description")
 

@@ -38,6 +38,16 @@ class Check:
         return room / scale if math.isfinite(room) else math.nan
 
 
+def at_most(name: str, value: float, limit: float, reason: str, unit: str = "1") -> Check:
+    """The value must not exceed the limit."""
+    return Check(name, float(value), limit, unit=unit, reason=reason)
+
+
+def at_least(name: str, value: float, limit: float, reason: str, unit: str = "1") -> Check:
+    """The value must reach the limit."""
+    return Check(name, float(value), limit, at_most=False, unit=unit, reason=reason)
+
+
 @dataclass(frozen=True)
 class Outcome:
     """What came out: sections of the report (tables beside the paper's values, figures), checks, and remarks in words.
