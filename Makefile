@@ -14,10 +14,10 @@ test: $(VENV)/installed
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
-	$(BIN)/pytest
+	$(BIN)/pytest -n auto --durations=10
 
 test-slow: test
-	$(BIN)/pytest -m slow
+	$(BIN)/pytest -n auto -m slow
 
 $(VENV)/installed: pyproject.toml
 	$(PYTHON) -m venv $(VENV)

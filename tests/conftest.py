@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import shutil
+import signal
 import tempfile
 
 import numpy as np
@@ -14,10 +15,16 @@ from support.places import SHARED
 
 def pytest_configure(config: pytest.Config) -> None:
     """Make one folder for all workers of this run; the process that starts them deletes it at the end."""
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # ignored where the tests run in the background
     if hasattr(config, "workerinput"):
         return
     os.environ[SHARED] = tempfile.mkdtemp(prefix="imufmu_tests_")
     config.add_cleanup(lambda: shutil.rmtree(os.environ.pop(SHARED), ignore_errors=True))
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Long tests first: one that begins last would keep its worker while the others have nothing left to do."""
+    items.sort(key=lambda item: item.get_closest_marker("long") is None)
 
 
 @pytest.fixture

@@ -108,7 +108,7 @@ def test_archive_holds_documentation_icon_sources_and_a_binary_of_its_name(name)
         page = archive.read("documentation/index.html").decode()
         picture = archive.read("model.png")
     assert f"binaries/linux64/{name}.so" in members and f"binaries/win64/{name}.dll" in members
-    assert f"resources/{name}_fmu.py" in members and "resources/imufmu/block.py" in members
+    assert f"resources/{name}_fmu.py" in members and "resources/imufmu/blocks/block.py" in members
     assert picture.startswith(b"\x89PNG")
     for parameter in BLOCKS[name].parameters:
         assert parameter.name in page and parameter.description.split(";")[0][:20] in page

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from imufmu import cosim
+import imufmu
 from imufmu.blocks.running import run
 from imufmu.estimators import bennett2014 as estimator
 from imufmu.papers import motions
@@ -135,7 +135,7 @@ def test_the_chain_equals_the_co_simulated_fmus(tmp_path: Path) -> None:
     connections += wires("imu2", "accel", "filter", "accel2")
     parameters |= {f"filter.{name}": value for name, value in settings.items()}
     description = write_ssd(tmp_path / "arm.ssd", components, connections, stop=first.truth.time[-1], step=PERIOD)
-    together = cosim.simulate(
+    together = imufmu.simulate(
         description, parameters=parameters, record=["filter.vertical", "filter.angle", "filter.tilt_std"]
     )
     for name in ("vertical", "angle", "tilt_std"):

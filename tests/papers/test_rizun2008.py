@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from imufmu import cosim
+import imufmu
 from imufmu.blocks.running import simulate
 from imufmu.estimators import rizun2008
 from imufmu.files.locations import models_folder
@@ -44,8 +44,8 @@ def test_the_chain_equals_the_co_simulated_fmus(tmp_path: Path) -> None:
     (tmp_path / "imus" / "mtx.ssv").write_bytes((folder / "imus" / "mtx.ssv").read_bytes())
     description = tmp_path / "system" / "pendulum_rizun2008.ssd"
     description.write_text(text, encoding="utf-8")
-    together = cosim.simulate(description, stop_time=4.0)
-    settings = cosim.System.read(description).settings
+    together = imufmu.simulate(description, stop_time=4.0)
+    settings = imufmu.System.read(description).settings
     imu_errors = {s.variable.name: s.value for s in settings if s.component == "imu"}
 
     plant = simulate(PENDULUM, 4.0, 0.01, parameters={"motion": DRIVEN})

@@ -279,9 +279,11 @@ def test_an_unknown_paper_is_one_clear_message_and_exit_code_2(monkeypatch, caps
     assert capsys.readouterr().err.startswith("error: no paper is called 'lee2013'; there is lee2012, leechoi2018,")
 
 
-def test_every_paper_passes_its_quick_run_and_can_be_told_in_every_form(tmp_path):
-    found = validate(quick=True, drawn=True)
-    assert {verdict.name: verdict.error for verdict in found} == dict.fromkeys(PAPERS, "")
+@pytest.mark.long
+@pytest.mark.parametrize("paper", PAPERS)
+def test_a_paper_passes_its_quick_run_and_can_be_told_in_every_form(paper, tmp_path):
+    found = validate([paper], quick=True, drawn=True)
+    assert {verdict.name: verdict.error for verdict in found} == {paper: ""}
     assert [(v.name, check.name, check.value) for v in found for check in v.failed] == []
     for verdict in found:
         names = [check.name for check in verdict.checks]
@@ -294,7 +296,7 @@ def test_every_paper_passes_its_quick_run_and_can_be_told_in_every_form(tmp_path
     write_json(tmp_path / "v.json", found, quick=True)
     count = sum(len(verdict.checks) for verdict in found)
     assert ElementTree.parse(tmp_path / "v.xml").getroot().get("tests") == str(count)
-    assert (tmp_path / "v.html").read_text(encoding="utf-8").count('class="passed"') == count + len(PAPERS)
+    assert (tmp_path / "v.html").read_text(encoding="utf-8").count('class="passed"') == count + len(found)
 
 
 @pytest.mark.skipif(os.name == "nt", reason="sends SIGINT as a terminal on Linux and macOS does")

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from imufmu import cosim
+import imufmu
 from imufmu.blocks.running import Trajectory
 from imufmu.blocks.vocabulary import GRAVITY
 from imufmu.papers.motions import record
@@ -84,7 +84,7 @@ def test_the_chain_equals_the_co_simulated_fmus(tmp_path: Path) -> None:
     ]
     sources = {"plant": "handheld.fmu", "imu": "imu.fmu", "filter": "zihajehzadeh2014.fmu"}
     values = {"plant": plant | {"seed": seed}, "imu": NOISE | {"seed": 2**30 + seed}, "filter": PAPER}
-    together = cosim.simulate(
+    together = imufmu.simulate(
         write_ssd(tmp_path / "chain.ssd", sources, wires, stop=3.0, step=PERIOD),
         parameters={f"{part}.{name}": value for part, given in values.items() for name, value in given.items()},
     )
