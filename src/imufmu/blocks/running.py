@@ -51,19 +51,19 @@ def run(
     def columns(first: int, count: int) -> np.ndarray:
         return draws(streams, first, count).T
 
-    x, y0 = (np.array(part).ravel() for part in block.first_function(u[0], p, columns(0, 1)))
+    x, y0 = (part.full().ravel() for part in block.first_function(u[0], p, columns(0, 1)))
     if initial_state:
         _replace(x, block.held_state, initial_state)
         own = total_size(block.state)
-        y0 = np.array(block.output_function(x[:own], u[0], p, columns(0, 1))).ravel()
+        y0 = block.output_function(x[:own], u[0], p, columns(0, 1)).full().ravel()
     y = np.empty((n, len(y0)))
     y[0] = y0
     chunk, p_columns = _chunk(block.next_function), np.tile(p[:, None], _CHUNK)
     for first in range(1, n, _CHUNK):
         count = min(_CHUNK, n - first)
         states, rows = chunk(x, _padded(u[first : first + count]), p_columns, columns(first, _CHUNK))
-        x = np.array(states[:, count - 1]).ravel()
-        y[first : first + count] = np.array(rows).T[:count]
+        x = states[:, count - 1].full().ravel()
+        y[first : first + count] = rows.full().T[:count]
     period = p[_names(block).index("sample_period")]
     time = start_time + np.arange(n) * period
     if block.has_solver and not np.isfinite(y).all():
@@ -93,7 +93,7 @@ def simulate(
     per_row = solver_steps(step, p[_names(block).index("max_step")])
     time = start_time + np.arange(n + 1) * step
     states = np.empty((n + 1, total_size(block.held_state)))
-    states[0] = np.array(block.initial_function(p, draws(_streams(block, p), 0, 1)[0])).ravel()
+    states[0] = block.initial_function(p, draws(_streams(block, p), 0, 1)[0]).full().ravel()
     h = step / per_row
     t = (time[:-1, None] + np.arange(per_row) * h).reshape(-1, 1)
     u_held = np.repeat(u[:-1], per_row, axis=0)
@@ -101,13 +101,13 @@ def simulate(
     x = states[0]
     for first in range(0, len(t), _CHUNK):
         some = slice(first, min(first + _CHUNK, len(t)))
-        reached = np.array(chunk(x, _padded(u_held[some]), p_columns, _padded(t[some]), h_columns)).T
+        reached = chunk(x, _padded(u_held[some]), p_columns, _padded(t[some]), h_columns).full().T
         x = reached[some.stop - first - 1]
         done = np.arange(some.start + 1, some.stop + 1)  # solver steps behind us after each column
         whole = done % per_row == 0
         states[done[whole] // per_row] = reached[: len(done)][whole]
     reached_at = np.append(start_time, time[:-1] + step)  # t + h as an instance has it, to the last bit
-    y = np.array(block.output_function.map(n + 1)(states.T, u.T, np.tile(p[:, None], n + 1), reached_at[None, :])).T
+    y = block.output_function.map(n + 1)(states.T, u.T, np.tile(p[:, None], n + 1), reached_at[None, :]).full().T
     bad = np.flatnonzero(~np.isfinite(np.hstack([y, states])).all(axis=1))
     if bad.size:
         raise StepError(diverged(block, time[bad[0]], p[_names(block).index("max_step")]))
