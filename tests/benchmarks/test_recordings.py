@@ -6,7 +6,7 @@ import csv
 import json
 import math
 import re
-import sys
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +18,6 @@ from imufmu.benchmarks import peers
 from imufmu.benchmarks.contenders import FOR_REAL_RECORDINGS, TILT_TIME, with_real_parameters
 from imufmu.benchmarks.recordings import Benchmark, benchmark, tables, write_scores
 from imufmu.blocks.running import run
-from imufmu.cli import main as cli
 from imufmu.cosim.replay import estimator_fmu, replay
 from imufmu.estimators import plumb
 from imufmu.files.csv_table import write_csv
@@ -253,20 +252,9 @@ def test_the_csv_file_holds_every_score_bit_for_bit(folder: Path, tmp_path: Path
 
 
 @pytest.fixture
-def imufmu(monkeypatch, capsys, tmp_path):
-    """Run ``imufmu benchmark``; returns exit code, standard output, standard error."""
-    monkeypatch.chdir(tmp_path)
-
-    def call(*arguments: str) -> tuple[int, str, str]:
-        monkeypatch.setattr(sys, "argv", ["imufmu", "benchmark", *map(str, arguments)])
-        try:
-            cli.main()
-            code = 0
-        except SystemExit as end:
-            code = int(end.code or 0)
-        return (code, *capsys.readouterr())
-
-    return call
+def imufmu(imufmu):
+    """The command ``imufmu benchmark``."""
+    return partial(imufmu, "benchmark")
 
 
 def test_the_command_prints_tables_parameters_and_what_it_left_out(imufmu, folder):

@@ -15,27 +15,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from imufmu.cli import main as cli
 from imufmu.cosim.results import read_hdf5
 from imufmu.files.csv_table import write_csv
-
-
-@pytest.fixture
-def imufmu(monkeypatch, capsys, tmp_path):
-    """Run the command in an empty folder; returns exit code, standard output, standard error."""
-    monkeypatch.chdir(tmp_path)
-
-    def call(*arguments: object) -> tuple[int, str, str]:
-        monkeypatch.setattr(sys, "argv", ["imufmu", *map(str, arguments)])
-        try:
-            cli.main()
-            code = 0
-        except SystemExit as end:
-            code = int(end.code or 0)
-        captured = capsys.readouterr()
-        return code, captured.out, captured.err
-
-    return call
 
 
 @pytest.fixture

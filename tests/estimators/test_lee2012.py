@@ -13,6 +13,7 @@ from imufmu.blocks.running import Trajectory, run
 from imufmu.blocks.vocabulary import Status
 from imufmu.estimators.lee2012 import BLOCK
 from support import golden, motions
+from support.missing import without_accel
 from support.motions import G, angle
 
 
@@ -195,13 +196,6 @@ def test_given_angles_are_the_start(rng: np.random.Generator) -> None:
 # The gyroscope alone
 
 
-def without_accel(motion: motions.Motion, first: int) -> dict[str, np.ndarray]:
-    """Inputs whose accelerometer is missing from row ``first`` on."""
-    accel = motion.accel.copy()
-    accel[first:] = math.nan
-    return {"gyro": motion.gyro, "accel": accel}
-
-
 def test_without_accelerometer_the_gyroscope_carries_the_vertical() -> None:
     """1 rad/s for 5 s: the first-order step of (12) turns by atan(w dt), short by (w dt)^2 / 3 of it: 1.7e-4 rad.
 
@@ -237,53 +231,6 @@ def test_an_endless_gap_in_fast_rotation_stays_finite_and_ends_well(mode: int) -
         assert np.isfinite(values).all(), name
     assert angle(result["vertical"][-1:], after.vertical[-1:])[0] < 1e-6
     assert result["tilt_std"][-1] < 0.01
-
-
-# Missing samples
-
-
-def flags(result: Trajectory) -> list[int]:
-    return result["status"].astype(int).tolist()
-
-
-def test_status_names_each_missing_sample_and_clears(rng: np.random.Generator) -> None:
-    motion = motions.motion(rng, 6)
-    motion.gyro[1:3, 0] = math.nan
-    motion.accel[2:4, 2] = math.inf
-    both = Status.GYRO_MISSING | Status.ACCEL_MISSING
-    result = estimate(motion)
-    assert flags(result) == [0, Status.GYRO_MISSING, both, Status.ACCEL_MISSING, 0, 0]
-    for name, values in result.values.items():
-        assert np.isfinite(values).all(), name
-
-
-def test_a_missing_gyroscope_sample_is_the_last_one_held(rng: np.random.Generator) -> None:
-    missing, held = (motions.motion(np.random.default_rng(3), 50) for _ in range(2))
-    missing.gyro[10:15] = math.nan
-    held.gyro[10:15] = held.gyro[9]
-    assert np.array_equal(estimate(missing)["vertical"], estimate(held)["vertical"])
-
-
-@pytest.mark.parametrize("unusable", [math.nan, 0.0, 5e-324, 1e-150], ids=str)
-def test_the_first_usable_accelerometer_sample_starts_the_filter(unusable: float, shaken: motions.Motion) -> None:
-    """A missing one, and one without a direction (an input that nobody has set yet), are waited out."""
-    accel = shaken.accel.copy()
-    accel[:7] = unusable
-    late = run(BLOCK, {"gyro": shaken.gyro, "accel": accel})
-    own = run(BLOCK, {"gyro": shaken.gyro[7:], "accel": accel[7:]})
-    assert np.array_equal(late["vertical"][7:], own["vertical"])
-    assert np.array_equal(late["P"][7:], own["P"])
-    waiting = Status.NOT_INITIALISED | (Status.ACCEL_MISSING if math.isnan(unusable) else 0)
-    assert flags(late) == [waiting] * 7 + [0] * (len(accel) - 7)
-    assert np.array_equal(late["vertical"][:7], np.tile([0, 0, 1], (7, 1)))
-    assert np.array_equal(late["external_acceleration"][:7], np.zeros((7, 3)))
-
-
-def test_given_angles_start_the_filter_without_accelerometer() -> None:
-    inputs = without_accel(motions.turn(Rotation.identity(), np.array([1.0, 0, 0]), 11), 0)
-    result = run(BLOCK, inputs, {"use_initial_angles": True, "initial_roll": 0.3})
-    assert flags(result) == [Status.ACCEL_MISSING] * 11
-    assert result["roll"][-1] == pytest.approx(0.4, abs=1e-5)  # 0.1 rad of turn, first order
 
 
 # The filter about itself

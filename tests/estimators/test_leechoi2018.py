@@ -12,10 +12,10 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from imufmu.blocks.running import Trajectory, run
-from imufmu.blocks.vocabulary import Status
 from imufmu.estimators import leechoi2018
 from imufmu.estimators.leechoi2018 import BLOCK
 from support import golden, motions
+from support.missing import without_accel
 from support.motions import G, angle
 
 FAST = 0.05  # s, the slowest sampling of the paper: a sample of fast motion turns by half a radian
@@ -222,13 +222,6 @@ def test_given_angles_are_the_start(rng: np.random.Generator) -> None:
 # The gyroscope alone
 
 
-def without_accel(motion: motions.Motion, first: int) -> dict[str, np.ndarray]:
-    """Inputs whose accelerometer is missing from row ``first`` on."""
-    accel = motion.accel.copy()
-    accel[first:] = math.nan
-    return {"gyro": motion.gyro, "accel": accel}
-
-
 def test_without_accelerometer_the_gyroscope_carries_the_vertical() -> None:
     """1 rad/s for 5 s: a step of third order is short by (w dt)^5 / 30 of turn and longer by nothing that turns."""
     motion = motions.turn(Rotation.identity(), np.array([0.6, -0.8, 0.0]), 501)
@@ -279,21 +272,6 @@ def test_a_gap_leaves_the_covariance_symmetric(fast: motions.Motion) -> None:
 # Missing samples
 
 
-def flags(result: Trajectory) -> list[int]:
-    return result["status"].astype(int).tolist()
-
-
-def test_status_names_each_missing_sample_and_clears(rng: np.random.Generator) -> None:
-    motion = motions.motion(rng, 6)
-    motion.gyro[1:3, 0] = math.nan
-    motion.accel[2:4, 2] = math.inf
-    both = Status.GYRO_MISSING | Status.ACCEL_MISSING
-    result = estimate(motion)
-    assert flags(result) == [0, Status.GYRO_MISSING, both, Status.ACCEL_MISSING, 0, 0]
-    for name, values in result.values.items():
-        assert np.isfinite(values).all(), name
-
-
 def test_a_missing_accelerometer_sample_is_the_limit_of_an_infinite_variance(fast: motions.Motion) -> None:
     """Nothing of the sample enters, up to 1e-12 of the variance of the state over that of the sample."""
     gap = run(BLOCK, without_accel(fast, 50), {"sample_period": fast.dt})
@@ -302,34 +280,6 @@ def test_a_missing_accelerometer_sample_is_the_limit_of_an_infinite_variance(fas
     vague = run(BLOCK, rest, {"sample_period": fast.dt, "sigma_a2": 1e6}, initial_state=state)
     assert np.allclose(vague["gravity"], gap["gravity"][49:55], rtol=0, atol=1e-6)
     assert np.allclose(vague["P"], gap["P"][49:55], rtol=0, atol=1e-9)
-
-
-def test_a_missing_gyroscope_sample_is_the_last_one_held() -> None:
-    missing, held = (motions.motion(np.random.default_rng(3), 50) for _ in range(2))
-    missing.gyro[10:15] = math.nan
-    held.gyro[10:15] = held.gyro[9]
-    assert np.array_equal(estimate(missing)["vertical"], estimate(held)["vertical"])
-
-
-@pytest.mark.parametrize("unusable", [math.nan, 0.0, 5e-324, 1e-150], ids=str)
-def test_the_first_usable_accelerometer_sample_starts_the_filter(unusable: float, fast: motions.Motion) -> None:
-    """A missing one, and one without a direction (an input that nobody has set yet), are waited out."""
-    accel = fast.accel.copy()
-    accel[:7] = unusable
-    late = run(BLOCK, {"gyro": fast.gyro, "accel": accel}, {"sample_period": fast.dt})
-    own = run(BLOCK, {"gyro": fast.gyro[7:], "accel": accel[7:]}, {"sample_period": fast.dt})
-    assert np.array_equal(late["vertical"][7:], own["vertical"])
-    assert np.array_equal(late["P"][7:], own["P"])
-    waiting = Status.NOT_INITIALISED | (Status.ACCEL_MISSING if math.isnan(unusable) else 0)
-    assert flags(late) == [waiting] * 7 + [0] * (len(accel) - 7)
-    assert np.array_equal(late["vertical"][:7], np.tile([0, 0, 1], (7, 1)))
-
-
-def test_given_angles_start_the_filter_without_accelerometer() -> None:
-    inputs = without_accel(motions.turn(Rotation.identity(), np.array([1.0, 0, 0]), 11), 0)
-    result = run(BLOCK, inputs, {"use_initial_angles": True, "initial_roll": 0.3})
-    assert flags(result) == [Status.ACCEL_MISSING] * 11
-    assert result["roll"][-1] == pytest.approx(0.4, abs=1e-9)  # 0.1 rad of turn, third order
 
 
 # The filter about itself

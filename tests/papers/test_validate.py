@@ -10,6 +10,7 @@ import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
+from functools import partial
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -159,25 +160,14 @@ def found(papers: Papers) -> list[Verdict]:
 
 
 @pytest.fixture
-def imufmu(found, monkeypatch, capsys, tmp_path):
+def imufmu(imufmu, found, monkeypatch):
     """Run ``imufmu validate`` as if the experiments were ``found``; returns exit code, output, standard error."""
 
     def ready(names: Sequence[str], **options: object) -> list[Verdict]:
         return [verdict for verdict in found if verdict.name in (names or ("good", "bad", "broken"))]
 
     monkeypatch.setattr(gate, "validate", ready)
-    monkeypatch.chdir(tmp_path)
-
-    def call(*arguments: str) -> tuple[int, str, str]:
-        monkeypatch.setattr(sys, "argv", ["imufmu", "validate", *arguments])
-        try:
-            cli.main()
-            code = 0
-        except SystemExit as end:
-            code = int(end.code or 0)
-        return (code, *capsys.readouterr())
-
-    return call
+    return partial(imufmu, "validate")
 
 
 def test_passing_is_exit_code_0_and_says_what_does_not_reproduce(imufmu):
