@@ -26,6 +26,17 @@ def test_an_fmu_refuses_to_start_on_another_imufmu_in_memory(tmp_path):
     fmu.Fmu("lee2012").initialise().close()
 
 
+def test_an_fmu_whose_modules_lie_elsewhere_is_refused_too(tmp_path):
+    """Built before a module moved: the package in memory must not serve it by accident."""
+    folder = shutil.copytree(fmu.unpacked("lee2012"), tmp_path / "older")
+    package = Path(folder) / "resources" / "imufmu"
+    for module in (package / "blocks").glob("*.py"):
+        module.rename(package / module.name) if module.stem != "__init__" else module.unlink()
+    assert "another version of imufmu" in runtime.refusal(Path(folder) / "resources")
+    with pytest.raises(Exception, match="Failed to instantiate"):
+        fmu.Fmu("lee2012", folder=str(folder))
+
+
 def test_a_script_may_simulate_again_and_again_with_fmpy(tmp_path):
     """FMPy deletes what it unpacked, with it the imufmu that the first FMU brought into the process."""
     program = """if True:
