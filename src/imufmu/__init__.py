@@ -15,7 +15,8 @@ __version__ = "0.1.0"
 _FACE: dict[str, tuple[str, str]] = {
     name: (module, own or name)
     for module, names in {
-        "blocks.running": {"Stream": "", "Trajectory": "", "run": "", "run_plant": "simulate"},
+        "blocks.running": {"Stream": "", "Trajectory": ""},
+        "compiled.running": {"run": "", "run_plant": "simulate"},
         "benchmarks.recordings": {"benchmark": ""},
         "compiled.compilers": {"BuildError": ""},
         "cosim.description": {"DescriptionError": ""},

@@ -17,7 +17,7 @@ from scipy.spatial.transform import Rotation
 from imufmu.benchmarks import peers
 from imufmu.benchmarks.contenders import FOR_REAL_RECORDINGS, TILT_TIME, with_real_parameters
 from imufmu.benchmarks.recordings import Benchmark, benchmark, tables, write_scores
-from imufmu.blocks.running import run
+from imufmu.compiled.running import run
 from imufmu.cosim.replay import estimator_fmu, replay
 from imufmu.estimators import plumb
 from imufmu.files.csv_table import write_csv

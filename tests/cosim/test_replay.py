@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from imufmu import SimulationError, WiringError
-from imufmu.blocks.running import run
+from imufmu.compiled.running import run
 from imufmu.cosim.replay import estimator_fmu, replay
 from imufmu.estimators import lee2012
 from imufmu.files.csv_table import write_csv

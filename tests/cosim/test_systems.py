@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from imufmu import System, locate, pack, simulate
-from imufmu.blocks.running import run
+from imufmu.compiled.running import run
 from imufmu.files.locations import models_folder
 from imufmu.registry import BLOCKS
 

@@ -10,8 +10,9 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from imufmu.blocks.running import Trajectory, run, simulate
+from imufmu.blocks.running import Trajectory
 from imufmu.blocks.vocabulary import Status
+from imufmu.compiled.running import run, simulate
 from imufmu.estimators import bennett2014
 from imufmu.estimators.bennett2014 import BLOCK
 from imufmu.plants.pendulum import DOUBLE_PENDULUM

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from scipy.signal import medfilt
 
-from imufmu.blocks.running import run
 from imufmu.blocks.vocabulary import Status
+from imufmu.compiled.running import run
 from imufmu.estimators.bennett2014 import BLOCK
 from imufmu.estimators.running_median import centred_median
 from support import golden

@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from imufmu.blocks.running import Trajectory, run
+from imufmu.blocks.running import Trajectory
 from imufmu.blocks.vocabulary import Status
+from imufmu.compiled.running import run
 from imufmu.estimators.lee2012 import BLOCK
 from support import golden, motions
 from support.missing import without_accel

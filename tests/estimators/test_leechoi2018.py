@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from imufmu.blocks.running import Trajectory, run
+from imufmu.blocks.running import Trajectory
+from imufmu.compiled.running import run
 from imufmu.estimators import leechoi2018
 from imufmu.estimators.leechoi2018 import BLOCK
 from support import golden, motions

@@ -10,8 +10,9 @@ import pytest
 from scipy.linalg import expm
 from scipy.spatial.transform import Rotation
 
-from imufmu.blocks.running import Trajectory, run
+from imufmu.blocks.running import Trajectory
 from imufmu.blocks.vocabulary import Status
+from imufmu.compiled.running import run
 from imufmu.estimators.rizun2008 import BLOCK
 from imufmu.recordings import reading as recordings
 from imufmu.scoring import prediction

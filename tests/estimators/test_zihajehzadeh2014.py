@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from imufmu.blocks.running import run
 from imufmu.blocks.vocabulary import MID_EUROPE, Status
+from imufmu.compiled.running import run
 from imufmu.estimators import lee2012
 from imufmu.estimators.zihajehzadeh2014 import BLOCK
 from support import golden, motions

@@ -11,9 +11,10 @@ from scipy.spatial.transform import Rotation
 
 from imufmu.blocks import vocabulary as v
 from imufmu.blocks.block import Block, ContinuousBlock, SampledBlock
-from imufmu.blocks.running import Trajectory, simulate
+from imufmu.blocks.running import Trajectory
 from imufmu.blocks.signals import UNITS, Signal
 from imufmu.blocks.vocabulary import MID_EUROPE, Status
+from imufmu.compiled.running import simulate
 from imufmu.registry import BLOCKS, ESTIMATORS, PLANTS
 from support import motions
 from support.backends import BACKENDS, PLANT_STEP, Backend, InProcess, Refused

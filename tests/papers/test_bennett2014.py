@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import imufmu
-from imufmu.blocks.running import run
+from imufmu.compiled.running import run
 from imufmu.estimators import bennett2014 as estimator
 from imufmu.papers import motions
 from imufmu.papers.bennett2014 import experiment

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from imufmu.blocks.running import run
+from imufmu.compiled.running import run
 from imufmu.papers.motions import parameter_set, read, record, white_noise
 from imufmu.plants import pendulum
 from imufmu.plants.handheld import BLOCK

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import imufmu
-from imufmu.blocks.running import simulate
+from imufmu.compiled.running import simulate
 from imufmu.estimators import rizun2008
 from imufmu.files.locations import models_folder
 from imufmu.papers.rizun2008 import experiment, runs

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from imufmu import System, locate
-from imufmu.blocks.running import simulate
+from imufmu.compiled.running import simulate
 from imufmu.pictures.bodies import Body, body_of, recorded
 from imufmu.plants.handheld import BLOCK as HANDHELD
 from imufmu.plants.handheld import BOX

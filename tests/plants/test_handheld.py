@@ -16,9 +16,9 @@ from scipy.stats import chi, kstest, norm
 from imufmu import System, locate
 from imufmu import simulate as cosimulate
 from imufmu.blocks.noise import uniforms
-from imufmu.blocks.running import simulate
 from imufmu.blocks.signals import UNITS
 from imufmu.blocks.vocabulary import GRAVITY, MID_EUROPE
+from imufmu.compiled.running import simulate
 from imufmu.papers.motions import parameter_set
 from imufmu.plants.handheld import BLOCK
 from imufmu.plants.random_vectors import DRAWS, LINES, evenly, lines

@@ -11,8 +11,8 @@ from scipy.integrate import solve_ivp
 from scipy.interpolate import make_interp_spline
 
 from imufmu.blocks.block import ParameterError
-from imufmu.blocks.running import simulate
 from imufmu.blocks.vocabulary import GRAVITY, MID_EUROPE
+from imufmu.compiled.running import simulate
 from imufmu.plants.human import body
 from imufmu.plants.human.plant import BLOCK
 from imufmu.plants.time_functions import smooth_step, step_double_integral, step_integral

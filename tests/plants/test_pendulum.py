@@ -13,8 +13,8 @@ from scipy.integrate import cumulative_simpson, solve_ivp
 
 from imufmu.blocks.block import ContinuousBlock
 from imufmu.blocks.instance import ContinuousInstance
-from imufmu.blocks.running import simulate
 from imufmu.blocks.vocabulary import GRAVITY, MID_EUROPE
+from imufmu.compiled.running import simulate
 from imufmu.plants.pendulum import DOUBLE_PENDULUM, PENDULUM, pendulum
 from imufmu.plants.pendulum_parts import free_acceleration
 from imufmu.registry import BLOCKS

@@ -10,8 +10,9 @@ import pytest
 from scipy.optimize import brentq
 
 from imufmu.blocks.block import ContinuousBlock
-from imufmu.blocks.running import Trajectory, simulate
+from imufmu.blocks.running import Trajectory
 from imufmu.blocks.vocabulary import GRAVITY, MID_EUROPE
+from imufmu.compiled.running import simulate
 from imufmu.papers.motions import parameter_set
 from imufmu.plants.pendulum import DOUBLE_PENDULUM, PENDULUM
 from imufmu.plants.pendulum_parts import stop_torque

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from imufmu import Result, System, locate, simulate
-from imufmu.blocks.running import run
+from imufmu.compiled.running import run
 from imufmu.files.locations import models_folder
 from imufmu.papers.motions import parameter_set
 from imufmu.registry import BLOCKS

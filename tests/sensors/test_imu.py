@@ -11,8 +11,9 @@ from lxml import etree
 from scipy.stats import chi2, norm
 
 from imufmu.blocks.instance import SampledInstance
-from imufmu.blocks.running import Stream, run
+from imufmu.blocks.running import Stream
 from imufmu.blocks.signals import UNITS
+from imufmu.compiled.running import run
 from imufmu.sensors.imu import BLOCK
 from support.places import ROOT
 

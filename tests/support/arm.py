@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from imufmu.blocks.running import Trajectory, run
+from imufmu.blocks.running import Trajectory
+from imufmu.compiled.running import run
 from imufmu.estimators.bennett2014 import BLOCK
 from support import golden
 

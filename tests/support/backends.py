@@ -13,7 +13,8 @@ import numpy as np
 
 from imufmu.blocks.block import Block, ContinuousBlock, SampledBlock
 from imufmu.blocks.instance import StepError, instantiate
-from imufmu.blocks.running import Trajectory, run, simulate
+from imufmu.blocks.running import Trajectory
+from imufmu.compiled.running import run, simulate
 from support.backend_native_fmu import NativeFmu
 from support.backend_python_fmu import PythonFmu, Refused
 

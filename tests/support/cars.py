@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from imufmu.blocks.running import Trajectory, simulate
+from imufmu.blocks.running import Trajectory
+from imufmu.compiled.running import simulate
 from imufmu.plants.vehicle.plant import BLOCK
 
 CARS = ("ford_escort", "bmw_320i", "vw_vanagon")  # parameter sets in models/vehicle

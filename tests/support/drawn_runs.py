@@ -9,7 +9,8 @@ import numpy as np
 
 from imufmu import Result
 from imufmu.blocks.block import Block, ContinuousBlock
-from imufmu.blocks.running import Trajectory, run, simulate
+from imufmu.blocks.running import Trajectory
+from imufmu.compiled.running import run, simulate
 from imufmu.registry import BLOCKS
 
 

@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from imufmu.blocks.running import Trajectory, simulate
+from imufmu.blocks.running import Trajectory
+from imufmu.compiled.running import simulate
 from imufmu.plants.human.plant import BLOCK
 
 HEIGHT = 1.75

@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from imufmu.blocks.running import Trajectory, run
+from imufmu.blocks.running import Trajectory
+from imufmu.compiled.running import run
 from imufmu.estimators.zihajehzadeh2014 import BLOCK
 from support import motions
 from support.motions import FIELD_N

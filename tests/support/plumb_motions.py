@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from imufmu.blocks.running import Trajectory, run
+from imufmu.blocks.running import Trajectory
+from imufmu.compiled.running import run
 from imufmu.estimators import plumb
 from support import motions
 from support.motions import Motion, angle

@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 
 from ..blocks.block import SampledBlock
-from ..blocks.running import run
 from ..blocks.vocabulary import ACCEL, GYRO, MAG, VERTICAL
+from ..compiled.running import run
 from ..registry import ESTIMATORS
 
 Readings = Mapping[str, np.ndarray]  # by signal name, (n, 3), NaN where missing

@@ -24,9 +24,10 @@ import numpy as np
 from fmpy.fmi2 import FMU2Slave
 
 from ..blocks.block import SampledBlock
-from ..blocks.running import Stream, run
+from ..blocks.running import Stream
 from ..blocks.signals import total_size
 from ..compiled.compilers import compile_program
+from ..compiled.running import run
 from ..cosim.errors import SimulationError
 from ..cosim.slave import forget_paths
 from ..files.locations import fmu_src_folder

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
@@ -15,6 +15,7 @@ from .noise import draws
 from .signals import Signal, State, total_size
 
 _CHUNK = 1024  # steps evaluated by one call into CasADi
+_PORTION = 64 * _CHUNK  # samples whose noise is drawn at a time
 
 
 @dataclass(frozen=True)
@@ -28,6 +29,49 @@ class Trajectory:
         return self.values[name]
 
 
+# (block, state behind a sample, u, p, w of the samples that follow) -> (state behind the last one, y)
+Following = Callable[[SampledBlock, np.ndarray, np.ndarray, np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]
+# (block, state at the start, u, p, time (s) of all rows, step (s), solver steps in it) -> (states, y) of all rows
+Solved = Callable[
+    [ContinuousBlock, np.ndarray, np.ndarray, np.ndarray, np.ndarray, float, int], tuple[np.ndarray, np.ndarray]
+]
+
+
+def interpreted(
+    block: SampledBlock, x: np.ndarray, u: np.ndarray, p: np.ndarray, w: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Samples in a row by CasADi's interpreter: state behind the last one, and the reported signals of each."""
+    n, chunk, p_columns = len(u), _chunk(block.next_function), np.tile(p[:, None], _CHUNK)
+    y = np.empty((n, total_size(block.reported)))
+    for first in range(0, n, _CHUNK):
+        some = slice(first, min(first + _CHUNK, n))
+        states, rows = chunk(x, _padded(u[some]), p_columns, _padded(w[some]))
+        x = states[:, some.stop - first - 1].full().ravel()
+        y[some] = rows.full().T[: some.stop - first]
+    return x, y
+
+
+def solved_by_interpreter(
+    block: ContinuousBlock, x: np.ndarray, u: np.ndarray, p: np.ndarray, time: np.ndarray, step: float, per_row: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """Solver steps in a row by CasADi's interpreter: states and reported signals at ``time``."""
+    n, h = len(time) - 1, step / per_row
+    states = np.empty((n + 1, len(x)))
+    states[0] = x
+    t = (time[:-1, None] + np.arange(per_row) * h).reshape(-1, 1)
+    u_held = np.repeat(u[:-1], per_row, axis=0)
+    chunk, p_columns, h_columns = _chunk(block.advance_function), np.tile(p[:, None], _CHUNK), np.full((1, _CHUNK), h)
+    for first in range(0, len(t), _CHUNK):
+        some = slice(first, min(first + _CHUNK, len(t)))
+        reached = chunk(x, _padded(u_held[some]), p_columns, _padded(t[some]), h_columns).full().T
+        x = reached[some.stop - first - 1]
+        done = np.arange(some.start + 1, some.stop + 1)  # solver steps behind us after each column
+        whole = done % per_row == 0
+        states[done[whole] // per_row] = reached[: len(done)][whole]
+    p_columns = np.tile(p[:, None], n + 1)
+    return states, block.output_function.map(n + 1)(states.T, u.T, p_columns, reached_at(time, step)[None, :]).full().T
+
+
 def run(
     block: SampledBlock,
     inputs: Mapping[str, Any],
@@ -35,35 +79,31 @@ def run(
     *,
     initial_state: Mapping[str, Any] | None = None,
     start_time: float = 0.0,
+    following: Following = interpreted,
 ) -> Trajectory:
     """Run a sampled block over a record, one row per sample.
 
     inputs: array (n,) or (n, k) per input name; a missing name stays at its start value. NaN marks missing samples.
     parameters: values by name. initial_state: replaces the block's own state of that name after the first sample.
+    following: evaluates all samples behind the first; by default ``interpreted``.
     Raises ParameterError for parameters, ValueError for inputs that do not fit, StepError where the plant of a series
     diverges.
     """
     u = _input_rows(block, inputs)
     p = block.parameter_vector(parameters)
-    streams = _streams(block, p)
     n = len(u)
-
-    def columns(first: int, count: int) -> np.ndarray:
-        return draws(streams, first, count).T
-
-    x, y0 = (part.full().ravel() for part in block.first_function(u[0], p, columns(0, 1)))
+    streams = _streams(block, p)
+    w = draws(streams, 0, 1)[0]
+    x, y0 = (part.full().ravel() for part in block.first_function(u[0], p, w))
     if initial_state:
         _replace(x, block.held_state, initial_state)
         own = total_size(block.state)
-        y0 = block.output_function(x[:own], u[0], p, columns(0, 1)).full().ravel()
+        y0 = block.output_function(x[:own], u[0], p, w).full().ravel()
     y = np.empty((n, len(y0)))
     y[0] = y0
-    chunk, p_columns = _chunk(block.next_function), np.tile(p[:, None], _CHUNK)
-    for first in range(1, n, _CHUNK):
-        count = min(_CHUNK, n - first)
-        states, rows = chunk(x, _padded(u[first : first + count]), p_columns, columns(first, _CHUNK))
-        x = states[:, count - 1].full().ravel()
-        y[first : first + count] = rows.full().T[:count]
+    for first in range(1, n, _PORTION):
+        some = slice(first, min(first + _PORTION, n))
+        x, y[some] = following(block, x, u[some], p, draws(streams, first, some.stop - first))
     period = p[_names(block).index("sample_period")]
     time = start_time + np.arange(n) * period
     if block.has_solver and not np.isfinite(y).all():
@@ -79,11 +119,13 @@ def simulate(
     parameters: Mapping[str, Any] | None = None,
     *,
     start_time: float = 0.0,
+    solved: Solved = solved_by_interpreter,
 ) -> Trajectory:
     """Run a continuous block over ``duration`` (s) with outputs every ``step`` (s), the first at the start.
 
     inputs: array (n + 1,) or (n + 1, k) per input name, n = round(duration / step), row i held from i * step on; or one
-    value for the whole run. Raises ParameterError and ValueError as ``run``, StepError where the solution diverges.
+    value for the whole run. solved: the solver; by default ``solved_by_interpreter``. Raises ParameterError and
+    ValueError as ``run``, StepError where the solution diverges.
     """
     if not (0 < step < np.inf and 0.5 * step < duration < np.inf):
         raise ValueError(f"duration {duration} s must be finite and at least one step of {step} s")
@@ -92,22 +134,8 @@ def simulate(
     p = block.parameter_vector(parameters)
     per_row = solver_steps(step, p[_names(block).index("max_step")])
     time = start_time + np.arange(n + 1) * step
-    states = np.empty((n + 1, total_size(block.held_state)))
-    states[0] = block.initial_function(p, draws(_streams(block, p), 0, 1)[0]).full().ravel()
-    h = step / per_row
-    t = (time[:-1, None] + np.arange(per_row) * h).reshape(-1, 1)
-    u_held = np.repeat(u[:-1], per_row, axis=0)
-    chunk, p_columns, h_columns = _chunk(block.advance_function), np.tile(p[:, None], _CHUNK), np.full((1, _CHUNK), h)
-    x = states[0]
-    for first in range(0, len(t), _CHUNK):
-        some = slice(first, min(first + _CHUNK, len(t)))
-        reached = chunk(x, _padded(u_held[some]), p_columns, _padded(t[some]), h_columns).full().T
-        x = reached[some.stop - first - 1]
-        done = np.arange(some.start + 1, some.stop + 1)  # solver steps behind us after each column
-        whole = done % per_row == 0
-        states[done[whole] // per_row] = reached[: len(done)][whole]
-    reached_at = np.append(start_time, time[:-1] + step)  # t + h as an instance has it, to the last bit
-    y = block.output_function.map(n + 1)(states.T, u.T, np.tile(p[:, None], n + 1), reached_at[None, :]).full().T
+    x = block.initial_function(p, draws(_streams(block, p), 0, 1)[0]).full().ravel()
+    states, y = solved(block, x, u, p, time, step, per_row)
     bad = np.flatnonzero(~np.isfinite(np.hstack([y, states])).all(axis=1))
     if bad.size:
         raise StepError(diverged(block, time[bad[0]], p[_names(block).index("max_step")]))
@@ -152,6 +180,11 @@ class Stream:
         values = _by_name(self._instance.block.reported, self._instance.y[None, :].copy())
         result: dict[str, Any] = {name: value[0] for name, value in values.items()}
         return result | {"sample_time": self._instance.sample_time}
+
+
+def reached_at(time: np.ndarray, step: float) -> np.ndarray:
+    """Time of each row as an instance has it, t + h behind a step, to the last bit (s)."""
+    return np.append(time[0], time[:-1] + step)
 
 
 @lru_cache(maxsize=64)

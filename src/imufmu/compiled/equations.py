@@ -13,22 +13,47 @@ _STYLE: dict[str, Any] = {"with_header": False, "casadi_real": "double", "casadi
 
 
 def functions_of(block: Block) -> dict[str, Any]:
-    """CasADi Functions by the name that the wrapper calls them by."""
+    """CasADi Functions by the name that C calls them by: everything a run needs."""
     if isinstance(block, SampledBlock):
-        first, following, parts = block.first_function, block.next_function, block.slow_parts
+        parts = block.slow_parts
         in_place = {"block_step": parts.step, "block_slow": parts.slow, "block_report": parts.report} if parts else {}
-        return {
-            "block_first": first,
-            **(in_place or {"block_next": following}),
-            "block_first_derivative": output_derivative(block, first),
-            "block_next_derivative": output_derivative(block, following),
-        }
+        return {"block_first": block.first_function, **(in_place or {"block_next": block.next_function})}
     assert isinstance(block, ContinuousBlock)
     return {
         "block_initial": block.initial_function,
         "block_advance": block.advance_function,
         "block_output": block.output_function,
-        "block_output_derivative": output_derivative(block, block.output_function),
+    }
+
+
+def derivatives_of(block: Block) -> dict[str, Any]:
+    """The same for the derivatives of the outputs, which only FMUs have."""
+    if isinstance(block, SampledBlock):
+        return {
+            "block_first_derivative": output_derivative(block, block.first_function),
+            "block_next_derivative": output_derivative(block, block.next_function),
+        }
+    assert isinstance(block, ContinuousBlock)
+    return {"block_output_derivative": output_derivative(block, block.output_function)}
+
+
+def sizes(block: Block, functions: dict[str, Any]) -> dict[str, int]:
+    """Lengths of vectors and of the room that the functions need, by their names in C."""
+    needs = list(functions.values())
+    return {
+        "N_INPUTS": total_size(block.inputs),
+        "N_PARAMETERS": total_size(block.parameters),
+        "N_OUTPUTS": total_size(block.outputs),
+        "N_REPORTED": total_size(block.reported),
+        "N_STATE": total_size(block.held_state),
+        "N_HELD": total_size(block.inputs),  # the last of the state
+        "SLOW_STEPS": int("block_slow" in functions),
+        "N_FAST": functions["block_step"].numel_out(0) if "block_step" in functions else total_size(block.state),
+        "N_NORMALS": block.normals,
+        "N_ARGUMENTS": max(function.sz_arg() for function in needs),
+        "N_RESULTS": max(function.sz_res() for function in needs),
+        "N_WORK": max(function.sz_w() for function in needs),
+        "N_INTEGER_WORK": max(function.sz_iw() for function in needs),
     }
 
 

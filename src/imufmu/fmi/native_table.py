@@ -10,14 +10,14 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from .. import __version__
 from ..blocks.block import Block, ContinuousBlock, SampledBlock, Variable
 from ..blocks.instance import CLOCK_TOLERANCE, LONGEST_STEP
-from ..blocks.signals import Parameter, total_size
-from ..compiled.equations import equations, functions_of
+from ..blocks.signals import Parameter
+from ..compiled.equations import derivatives_of, equations, functions_of, sizes
 from .model_description import guid, value_references, variable_type
 
 
 def generate(block: Block) -> dict[str, str]:
     """Text by file name: ``block.c`` and ``equations.c``."""
-    functions = functions_of(block)
+    functions = functions_of(block) | derivatives_of(block)
     return {"block.c": _table(block, functions), "equations.c": equations(block, functions)}
 
 
@@ -40,25 +40,13 @@ def _table(block: Block, functions: dict[str, Any]) -> str:
 
 def _constants(block: Block, functions: dict[str, Any], references: dict[str, int]) -> dict[str, Any]:
     """Sizes, places and limits; a place is a value reference."""
-    sampled, needs = isinstance(block, SampledBlock), list(functions.values())
+    sampled = isinstance(block, SampledBlock)
     assert isinstance(block, SampledBlock | ContinuousBlock)
     return {
         "SAMPLED": int(sampled),
         "N_VARIABLES": len(references),
-        "N_INPUTS": total_size(block.inputs),
-        "N_PARAMETERS": total_size(block.parameters),
-        "N_OUTPUTS": total_size(block.outputs),
-        "N_REPORTED": total_size(block.reported),
-        "N_STATE": total_size(block.held_state),
-        "N_HELD": total_size(block.inputs),  # the last of the state
         "HAS_SOLVER": int(block.has_solver),
-        "SLOW_STEPS": int("block_slow" in functions),
-        "N_FAST": functions["block_step"].numel_out(0) if "block_step" in functions else total_size(block.state),
-        "N_NORMALS": block.normals,
-        "N_ARGUMENTS": max(function.sz_arg() for function in needs),
-        "N_RESULTS": max(function.sz_res() for function in needs),
-        "N_WORK": max(function.sz_w() for function in needs),
-        "N_INTEGER_WORK": max(function.sz_iw() for function in needs),
+        **sizes(block, functions),
         "PERIOD": references["sample_period" if sampled else "max_step"],
         "SAMPLE_TIME": references.get("sample_time", len(references)),  # a continuous block has none
         "CLOCK_TOLERANCE": repr(CLOCK_TOLERANCE),

@@ -11,7 +11,8 @@ import numpy as np
 from fmpy.ssp.ssd import read_ssv
 
 from ..blocks.block import ContinuousBlock
-from ..blocks.running import Trajectory, run, simulate
+from ..blocks.running import Trajectory
+from ..compiled.running import run, simulate
 from ..files.locations import models_folder
 from ..sensors import imu
 

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from imufmu.blocks.running import run
+from imufmu.compiled.running import run
 from support.plumb_motions import BLOCK, G, moving, rms, tilt_deg
 
 

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from imufmu.blocks.running import Trajectory, run
+from imufmu.blocks.running import Trajectory
 from imufmu.blocks.vocabulary import Status
+from imufmu.compiled.running import run
 from imufmu.scoring.metrics import heading_error
 from support import motions
 from support.motions import FIELD_N, Motion

@@ -9,7 +9,7 @@ import pytest
 from scipy.signal import lfilter
 from scipy.spatial.transform import Rotation
 
-from imufmu.blocks.running import run
+from imufmu.compiled.running import run
 from support import motions
 from support.motions import angle
 from support.plumb_motions import BLOCK, DEFAULTS, G, estimate, mean_rates, moving, rms, tilt_deg, tumbling

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from imufmu.blocks.instance import SampledInstance
-from imufmu.blocks.running import run
 from imufmu.blocks.signals import total_size
+from imufmu.compiled.running import run
 from imufmu.recordings.reading import read
 from imufmu.scoring.metrics import inclination_error
 from support.places import BROAD

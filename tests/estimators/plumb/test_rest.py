@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from imufmu.blocks.running import run
 from imufmu.blocks.vocabulary import Status
+from imufmu.compiled.running import run
 from support import motions
 from support.plumb_motions import BLOCK, DEFAULTS, G, estimate, tilt_deg
 

@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from imufmu.blocks.running import Trajectory, run
+from imufmu.blocks.running import Trajectory
+from imufmu.compiled.running import run
 from imufmu.estimators import lee2012, leechoi2018, rizun2008
 from support import driving
 from support.driving import DT, IMU_POSITION, MOUNT, Drive

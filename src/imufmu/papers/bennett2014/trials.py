@@ -18,7 +18,8 @@ from typing import Any
 
 import numpy as np
 
-from ...blocks.running import Trajectory, run
+from ...blocks.running import Trajectory
+from ...compiled.running import run
 from ...estimators import bennett2014
 from ...estimators.running_median import centred_median
 from ...plants.pendulum import DOUBLE_PENDULUM, DRIVEN

@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from ...blocks.running import Trajectory, run
+from ...blocks.running import Trajectory
+from ...compiled.running import run
 from ...estimators import lee2012
 from ...plants import handheld
 from ...scoring import metrics

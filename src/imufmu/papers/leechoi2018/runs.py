@@ -9,8 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from ...blocks.running import Trajectory, run
+from ...blocks.running import Trajectory
 from ...blocks.vocabulary import GRAVITY
+from ...compiled.running import run
 from ...estimators import leechoi2018
 from ...plants import handheld
 from ...scoring.metrics import at_rows, inclination_error, rms

@@ -17,8 +17,8 @@ import casadi as ca
 import numpy as np
 
 from ...blocks.rotations import over_rows, quaternion_from_rotation_vector, rotate_back
-from ...blocks.running import run
 from ...blocks.vocabulary import GRAVITY
+from ...compiled.running import run
 from ...sensors import imu
 
 UP = np.array([0.0, 0.0, 1.0])

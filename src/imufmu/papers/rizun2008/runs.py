@@ -13,9 +13,10 @@ import numpy as np
 from ...blocks import vocabulary as v
 from ...blocks.block import Expressions, SampledBlock
 from ...blocks.rotations import over_rows, rotate, rotate_back, unit
-from ...blocks.running import Trajectory, run, simulate
+from ...blocks.running import Trajectory
 from ...blocks.signals import State, real
 from ...blocks.vocabulary import GRAVITY
+from ...compiled.running import run, simulate
 from ...estimators import lee2012, rizun2008
 from ...plants.pendulum import DOUBLE_PENDULUM, DRIVEN
 from ...scoring import prediction

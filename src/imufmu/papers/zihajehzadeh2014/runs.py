@@ -11,8 +11,9 @@ from typing import Any
 
 import numpy as np
 
-from ...blocks.running import Trajectory, run
+from ...blocks.running import Trajectory
 from ...blocks.vocabulary import GRAVITY
+from ...compiled.running import run
 from ...estimators.zihajehzadeh2014 import BLOCK
 from ...scoring.metrics import angle_difference
 from ...sensors import imu

@@ -1,0 +1,117 @@
+"""Compiled blocks give the numbers of the interpreter, and where there is no compiler the interpreter serves."""
+
+from __future__ import annotations
+
+import shutil
+import warnings
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from imufmu.blocks import running as interpreted
+from imufmu.blocks.block import ContinuousBlock, SampledBlock
+from imufmu.compiled import library, running
+from imufmu.compiled.compilers import has_ziglang
+from imufmu.registry import BLOCKS
+from support import motions
+
+SAMPLED = [block for block in BLOCKS.values() if isinstance(block, SampledBlock)]
+CONTINUOUS = [block for block in BLOCKS.values() if isinstance(block, ContinuousBlock)]
+needs_compiler = pytest.mark.skipif(not (shutil.which("cc") or has_ziglang()), reason="needs a C compiler")
+
+
+@pytest.fixture
+def at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Compile for the first row."""
+    monkeypatch.setattr(library, "_ROWS_FOR_A_COMPILATION", 0)
+
+
+@pytest.fixture
+def fresh(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, at_once: None) -> Iterator[Path]:
+    """An empty cache, and nothing known about any block."""
+    monkeypatch.setattr(library, "user_cache_path", lambda _name: tmp_path)
+    for known in (library.compiled, library._say_once, library._loaded):
+        known.cache_clear()
+    yield tmp_path
+    for known in (library.compiled, library._say_once, library._loaded):
+        known.cache_clear()
+
+
+def readings(block: SampledBlock, rows: int) -> dict[str, np.ndarray]:
+    """What a moving, noisy sensor tells, with gaps; inputs that it does not have stay near their start."""
+    rng = np.random.default_rng(5)
+    moved = motions.motion(rng, rows).noisy(rng)
+    known = {"gyro": moved.gyro, "accel": moved.accel, "mag": moved.mag}
+    inputs = {}
+    for signal in block.inputs:
+        noise = rng.normal(0, 0.1, (rows, *signal.shape))
+        inputs[signal.name] = known.get(signal.name, np.array(signal.start_values()).reshape(signal.shape) + noise)
+        inputs[signal.name][rows // 3 : rows // 3 + 20] = np.nan
+    return inputs
+
+
+@needs_compiler
+@pytest.mark.parametrize("block", SAMPLED, ids=lambda block: block.name)
+def test_a_compiled_record_is_the_interpreted_one_to_the_last_bit(block: SampledBlock, at_once: None) -> None:
+    inputs = readings(block, 600)
+    here, there = running.run(block, inputs), interpreted.run(block, inputs)
+    assert library.compiled(block).library(0) is not None
+    for name, values in there.values.items():
+        assert np.array_equal(here[name], values, equal_nan=True), name
+
+
+@needs_compiler
+@pytest.mark.parametrize("block", CONTINUOUS, ids=lambda block: block.name)
+def test_a_compiled_plant_is_the_interpreted_one_to_the_last_bit(block: ContinuousBlock, at_once: None) -> None:
+    here, there = (way.simulate(block, 1.0, 0.02, start_time=5.0) for way in (running, interpreted))
+    assert library.compiled(block).library(0) is not None
+    for name, values in there.values.items():
+        assert np.array_equal(here[name], values, equal_nan=True), name
+
+
+@needs_compiler
+def test_a_long_record_goes_on_where_a_portion_ends(at_once: None, monkeypatch: pytest.MonkeyPatch) -> None:
+    block = BLOCKS["imu"]
+    whole = running.run(block, readings(block, 300))
+    monkeypatch.setattr(interpreted, "_PORTION", 100)
+    in_portions = running.run(block, readings(block, 300))
+    assert all(np.array_equal(whole[name], in_portions[name]) for name in whole.values)
+
+
+def test_without_a_compiler_the_interpreter_serves_and_says_so_once(
+    fresh: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("imufmu.compiled.compilers.has_ziglang", lambda: False)
+    monkeypatch.setenv("CC", "no-such-compiler")
+    inputs = readings(BLOCKS["lee2012"], 50)
+    with pytest.warns(UserWarning, match="interpreter.*no C compiler: 'no-such-compiler' is not installed"):
+        result = running.run(BLOCKS["lee2012"], inputs)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        again = running.run(BLOCKS["lee2012"], inputs)
+    assert np.array_equal(result["roll"], interpreted.run(BLOCKS["lee2012"], inputs)["roll"])
+    assert np.array_equal(result["roll"], again["roll"])
+
+
+@needs_compiler
+def test_a_library_that_others_can_write_is_not_loaded(fresh: Path) -> None:
+    inputs = readings(BLOCKS["rizun2008"], 50)
+    running.run(BLOCKS["rizun2008"], inputs)
+    (kept,) = fresh.rglob("rizun2008.*[!k]")
+    kept.chmod(0o666)
+    library._loaded.cache_clear()
+    with pytest.warns(UserWarning, match="belongs to others or can be written by them; delete it"):
+        result = running.run(BLOCKS["rizun2008"], inputs)
+    assert np.array_equal(result["roll"], interpreted.run(BLOCKS["rizun2008"], inputs)["roll"])
+
+
+@needs_compiler
+def test_a_short_run_compiles_nothing(fresh: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(library, "_ROWS_FOR_A_COMPILATION", 1000)
+    for _ in range(3):
+        running.run(BLOCKS["lee2012"], readings(BLOCKS["lee2012"], 300))
+    assert not list(fresh.rglob("lee2012*"))
+    running.run(BLOCKS["lee2012"], readings(BLOCKS["lee2012"], 300))  # 1196 rows behind first samples by now
+    assert list(fresh.rglob("lee2012*"))
