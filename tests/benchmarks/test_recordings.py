@@ -297,7 +297,7 @@ def test_a_users_mistake_is_one_clear_message_and_exit_code_2(imufmu, tmp_path):
 
 @needs_broad
 def test_two_trials_of_broad_score_as_replayed(tmp_path):
-    """Figures of the README, three digits, from the replay through the FMU."""
+    """Figures of docs/recordings.md, three digits, from the replay through the FMU."""
     for trial in ("01_undisturbed_slow_rotation_A", "15_undisturbed_fast_translation_A"):
         (tmp_path / f"{trial}.mat").symlink_to(BROAD / f"{trial}.mat")
     (tmp_path / "trials.json").symlink_to(BROAD / "trials.json")
@@ -310,12 +310,12 @@ def test_two_trials_of_broad_score_as_replayed(tmp_path):
 @pytest.mark.slow
 @needs_broad
 @needs_peers
-def test_the_readme_tells_what_the_benchmark_prints():
+def test_the_page_on_recordings_tells_what_the_benchmark_prints():
     """One row per filter: mean with the papers' parameters, truth delayed, with those for real recordings, delayed.
 
     Then the means of the heading errors, in the text.
     """
-    readme = (ROOT / "README.md").read_text(encoding="utf-8")
+    page = (ROOT / "docs" / "recordings.md").read_text(encoding="utf-8")
     sections = [section for section in tables(benchmark(BROAD)) if section.table]
     means: dict[str, list[str]] = {}
     for section in sections:
@@ -323,7 +323,7 @@ def test_the_readme_tells_what_the_benchmark_prints():
             for name, mean in zip(section.table.columns[1:], section.table.rows[0][1:], strict=True):
                 means.setdefault(name, []).append(mean)
     for name, row in means.items():
-        assert f"| {name} | {' | '.join(row)} |" in readme, row
+        assert f"| {name} | {' | '.join(row)} |" in page, row
     (heading,) = (section.table for section in sections if section.heading.startswith("Heading RMSE"))
     for mean in heading.rows[0][1:]:
-        assert re.search(rf"\b{re.escape(mean)}\b", readme), mean
+        assert re.search(rf"\b{re.escape(mean)}\b", page), mean

@@ -1,34 +1,61 @@
-"""The README is true: its lines run, its numbers are what the commands print, its links lead somewhere."""
+"""The README is short, tells the numbers of the pages behind it, and shows only the public face."""
 
 from __future__ import annotations
 
+import ast
 import re
 import sys
-from pathlib import Path
 
 import pytest
 
+import imufmu
 from imufmu.cli import main as cli
 from imufmu.registry import BLOCKS
 from imufmu.reports.demo import run_demo
-from support.places import ROOT
+from support.pages import fences, shell_lines, table_rows
+from support.places import BROAD, ROOT
 
 README = (ROOT / "README.md").read_text(encoding="utf-8")
-BROAD = ROOT.parent / "shared" / "data" / "broad"
+PAGES = {path.stem: path.read_text(encoding="utf-8") for path in (ROOT / "docs").glob("*.md")}
+WAYS = ("Drop in", "Script", "Replay", "Gate")
 
 
-def test_python_lines_run(tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-    (block,) = re.findall(r"```python\n(.*?)```", README, re.DOTALL)
-    assert len([line for line in block.splitlines() if line.strip()]) <= 8
-    exec(block, {})
-    assert 0 < float(capsys.readouterr().out.split()[-1]) < 90
-    assert [path.name for path in tmp_path.iterdir()] == ["run.csv"]
+def test_each_of_the_four_ways_takes_at_most_eight_lines():
+    for way in WAYS:
+        (part,) = re.findall(rf"^\*\*{way}\.\*\*(.*?)(?=^\*\*|^## )", README, re.DOTALL | re.MULTILINE)
+        blocks = re.findall(r"^```(?:sh|python)\n(.*?)^```$", part, re.DOTALL | re.MULTILINE)
+        assert blocks, way
+        assert sum(len(shell_lines(block)) for block in blocks) <= 8, way
+
+
+def test_readme_has_one_figure_two_commands_one_table_of_results_and_fits_three_screens():
+    assert README.count("![") == 1
+    assert [line.split()[1] for line in shell_lines(fences(ROOT / "README.md")[0].text)] == ["demo", "test"]
+    (results,) = re.findall(r"^## What came out\n(.*?)^## ", README, re.DOTALL | re.MULTILINE)
+    assert len(re.findall(r"^\|---", results, re.MULTILINE)) == 1
+    assert len(README.splitlines()) < 140
+
+
+def test_results_of_the_readme_are_those_of_the_pages():
+    """Columns: BROAD with the parameters for real recordings, truth delayed; then three systems."""
+    of_readme, broad, cars = (table_rows(text) for text in (README, PAGES["recordings"], PAGES["vehicles"]))
+    estimators = next(cells for name, cells in cars.items() if name == "system")
+    here = [name.replace(", ours", "").replace(", of others", "") for name in of_readme]
+    rows = dict(zip(here, of_readme.values(), strict=True))
+    for name in ("lee2012", "leechoi2018", "rizun2008", "plumb", "VQF"):
+        cells = next(cells for label, cells in rows.items() if label.replace("`", "") == name)
+        assert cells[0] == broad[name][-1], name
+    systems = [name.strip("`") for name in of_readme["estimator"][1:]]
+    for label, cells in rows.items():
+        name = label.replace("`", "")
+        column = {"plumb": "plumb without wheels", "plumb with the speed of the wheels": "plumb"}.get(name, name)
+        if column in estimators:
+            assert cells[1:] == [cars[system][estimators.index(column)] for system in systems], name
 
 
 def test_demo_table_is_what_the_demo_prints(tmp_path):
     for row in run_demo(tmp_path).table.rows:
-        assert f"| {' | '.join(row)} |" in README, row
+        assert f"| {' | '.join(row)} |" in PAGES["parameters"], row
 
 
 @pytest.mark.skipif(not BROAD.is_dir(), reason="the BROAD recordings are not beside the checkout")
@@ -38,14 +65,29 @@ def test_replay_numbers_are_what_replay_prints(trial, monkeypatch, capsys, tmp_p
     monkeypatch.setattr(sys, "argv", ["imufmu", "replay", str(BROAD / f"{trial}.mat"), "--estimator", "lee2012"])
     with pytest.raises(SystemExit):
         cli.main()
-    numbers = capsys.readouterr().out.splitlines()[1].split()
-    assert f"| {' | '.join(numbers)} |" in README or f"{numbers[3]} deg" in README, numbers
+    numbers, page = capsys.readouterr().out.splitlines()[1].split(), PAGES["recordings"]
+    assert f"| {' | '.join(numbers)} |" in page or f"{numbers[3]} deg" in page, numbers
 
 
-def test_every_block_is_in_the_table_and_every_link_leads_somewhere():
+def test_every_block_has_a_row_and_every_page_a_link():
     for name in BLOCKS:
-        assert f"`{name}`" in README
-    for target in re.findall(r"\]\(([^)]+)\)", README):
-        assert target.startswith("https://") or (ROOT / target).exists(), target
-    for command in re.findall(r"`imufmu (\w+)", README):
-        assert f'@app.command("{command}")' in Path(cli.__file__).read_text() or hasattr(cli, command), command
+        assert f"`{name}`" in PAGES["parameters"]
+    for name in PAGES:
+        assert f"](docs/{name}.md)" in README, name
+
+
+def test_readme_pages_and_examples_show_the_public_face_only():
+    """All but the page of architecture, which shows how a block is made."""
+    shown = {path.name: path.read_text(encoding="utf-8") for path in (ROOT / "examples").glob("*.py")}
+    for path in (ROOT / "README.md", *(ROOT / "docs").glob("*.md")):
+        if path.name != "architecture.md":
+            shown[path.name] = "\n".join(fence.text for fence in fences(path) if fence.language == "python")
+    for name, code in shown.items():
+        for node in ast.walk(ast.parse(code)):
+            if isinstance(node, ast.ImportFrom) and (node.module or "").split(".")[0] == "imufmu":
+                assert node.module == "imufmu", name
+                assert {alias.name for alias in node.names} <= set(imufmu.__all__), name
+            elif isinstance(node, ast.Import):
+                assert not any(alias.name.startswith("imufmu.") for alias in node.names), name
+            elif isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name) and node.value.id == "imufmu":
+                assert node.attr in imufmu.__all__, f"{name}: imufmu.{node.attr}"

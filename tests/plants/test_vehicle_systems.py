@@ -56,7 +56,7 @@ def test_every_estimator_reads_the_same_imu_and_only_plumb_the_wheels(system: st
         assert ("forward_speed" in fed) == (estimator == "plumb")
 
 
-@pytest.mark.parametrize("readme", ["README.md", "models/vehicle/README.md"])
+@pytest.mark.parametrize("readme", ["docs/vehicles.md", "models/vehicle/README.md"])
 @pytest.mark.parametrize("system", SYSTEMS)
 def test_the_readmes_tell_the_tilt_errors_that_come_out(system: str, readme: str) -> None:
     """To the digits given: one seed, so that only rounding may differ."""
