@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import html
-import inspect
 import re
 import subprocess
 import sys
@@ -14,12 +12,10 @@ import numpy as np
 import pytest
 from lxml import etree
 
-from imufmu.blocks.block import Block, SampledBlock
+from imufmu.blocks.block import SampledBlock
 from imufmu.blocks.signals import UNITS
 from imufmu.fmi.build import BuildError, build_fmu, cached_fmu
-from imufmu.fmi.documentation import documentation_page
 from imufmu.fmi.model_description import guid
-from imufmu.plants import truth
 from imufmu.registry import BLOCKS
 from support import fmu
 
@@ -146,16 +142,3 @@ def test_an_unknown_block_and_a_folder_that_is_a_file_are_refused_by_name(tmp_pa
     (tmp_path / "file").write_text("")
     with pytest.raises(BuildError, match=re.escape(str(tmp_path / "file"))):
         build_fmu("lee2012", tmp_path / "file")
-
-
-@pytest.mark.parametrize("block", BLOCKS.values(), ids=lambda block: block.name)
-def test_the_documentation_holds_the_equations_of_every_module_that_the_block_is_made_of(block: Block) -> None:
-    """A module of the same package that numbers equations of its own, and what every plant's truth is."""
-    module = sys.modules[block.output.__module__]
-    used = [sys.modules[getattr(value, "__module__", None) or module.__name__] for value in vars(module).values()]
-    used += [value for value in vars(module).values() if inspect.ismodule(value)]
-    page = html.unescape(documentation_page(block))
-    for part in {module, *used}:
-        text = inspect.cleandoc(part.__doc__ or "")
-        if part.__name__.rpartition(".")[0] == module.__package__ and ("(1)" in text or part is truth):
-            assert text in page, part

@@ -71,7 +71,10 @@ class Variable:
 
 @dataclass(frozen=True, kw_only=True)
 class Block:
-    """Common part of both kinds of block. ``doc`` is the text for its users, ``reference`` the paper."""
+    """Common part of both kinds of block.
+
+    doc: the text for its users. reference: the paper. when: when to use it, and what instead.
+    """
 
     name: str
     summary: str
@@ -83,6 +86,7 @@ class Block:
     own_parameters: tuple[Parameter, ...]
     state: tuple[State, ...]
     output: Callable[..., Expressions]
+    when: str = ""
     normals: int = 0  # standard normal draws per sample, or at the start of a continuous block
 
     @property

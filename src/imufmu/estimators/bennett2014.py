@@ -24,6 +24,26 @@ Roll and pitch are not reported: a hanging sensor stands at the singularity of E
 For the double pendulum of this package theta_1 = angle[1] - pi/2, theta_2 = angle[2], a1 = length[1], a2 =
 imu_distance, and mount = (0, pi/2, pi/2) turns its sensor into this frame.
 
+The arm, with theta_12 = theta_1 + theta_2, omega_12 and alpha_12 likewise. Where sensor 2 is, and what acceleration it
+feels by the motion, in frame 0 and along its own axes:
+
+    x = a_1 cos theta_1 + a_2 cos theta_12,   y = a_1 sin theta_1 + a_2 sin theta_12           (2), (5)
+    x'' = -a_1 (omega_1^2 cos theta_1 + alpha_1 sin theta_1)
+        - a_2 (omega_12^2 cos theta_12 + alpha_12 sin theta_12)                                (4)
+    y'' = a_1 (alpha_1 cos theta_1 - omega_1^2 sin theta_1)
+        + a_2 (alpha_12 cos theta_12 - omega_12^2 sin theta_12)                                (7)
+    A_rad = x'' cos theta_12 + y'' sin theta_12,   A_tan = x'' sin theta_12 - y'' cos theta_12    (8)
+    g_x = A_x - A_rad,   g_y = A_y - A_tan                                                     (9)
+
+The filter: each joint has a white jerk of density q over T = T_S, the position follows by its derivatives with respect
+to the angles, and there are three measurements:
+
+    x- = Phi x+,   P- = Phi P+ Phi' + Q                                                        (19), (20)
+    Q = diag(q_d, q_d, q_1 B, q_2 B, q_b, q_b),   B = [T^5/20 T^4/8 T^3/6; T^4/8 T^3/3 T^2/2; T^3/6 T^2/2 T]    (18)
+    s_1 = omega_1 + b_1,   s_2 = omega_1 + omega_2 + b_2,   s_3 = theta_1 + theta_2            (15)
+
+R of s_3 is sigma_s while both rates are below delta, sigma_f otherwise (17).
+
 Only theta_1 + theta_2 and b_2 are observable: an error of b_1 turns theta_1 and theta_2 away from each other for good.
 
 Differences from the paper: R is diagonal, so (21) to (23) take one measurement after the other, which is the same and
@@ -262,6 +282,11 @@ the paper computes of a whole record, switch median on, and read its sample k at
 by imufmu.estimators.running_median.centred_median.""",
     reference="T. R. Bennett, R. Jafari, N. Gans, Motion Based Acceleration Correction for Improved Sensor "
     "Orientation Estimates, 11th International Conference on Wearable and Implantable Body Sensor Networks, 2014",
+    when="""Use it for two rigid links that turn in one vertical plane with a sensor on each: a leg in walking, a
+robot arm. Knowing the lengths it takes the motion out of the accelerometer, which no filter of a single sensor can.
+Instead: plumb on the sensor of the segment, where the motion leaves the plane, the lengths are not known or one
+sensor is all there is; its tilt is as good in the arm moved by hand. No filter here knows the angle of a single
+joint for long.""",
     inputs=(
         Signal("gyro1", "rad/s", _DESCRIPTION.format("gyroscope on link 1"), -_RATE, _RATE, (3,)),
         Signal("gyro2", "rad/s", _DESCRIPTION.format("gyroscope on link 2"), -_RATE, _RATE, (3,)),

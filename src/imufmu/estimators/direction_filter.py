@@ -9,6 +9,22 @@ from the magnetometer. Equation numbers are those of [1].
     P       P      1       its covariance
     Z+, a+  Z, a   1, m/s2 vertical and external acceleration, a posteriori
 
+From one sample to the next, dt later, with Z+ and y_G of the one before:
+
+    Phi = I - dt [y_G x],   Q = -dt^2 sigma_G^2 [Z+ x] [Z+ x]                                (12), (15)
+    Z- = Phi Z+,   P- = Phi P+ Phi' + Q                                                      (24), (25)
+
+A measurement z of h Z, with the variance sigma^2 on each axis, corrects this:
+
+    K = h P- (h^2 P- + sigma^2 I)^-1                                                         (26)
+    Z+ = Z- + K (z - h Z-),   P+ = P- - h K P-                                               (27), (28)
+
+For the vertical the accelerometer measures g Z, less what is left of the external acceleration of the sample before.
+Then Z+ is given unit length, and what gravity leaves of the reading is the external acceleration:
+
+    z = y_A - c_a a+,   sigma^2 = c_a^2 |a+|^2 / 3 + sigma_A^2                               (18), (23)
+    a+ = y_A - g Z+                                                                          (29)
+
 A block that uses this module declares GYRO_VARIANCE and GYRO_INDEX, and ACCEL_VARIANCE and GRAVITY for the vertical.
 
 [1] Lee, Park, Robinovitch, Estimation of Attitude and External Acceleration Using Inertial Sensor Measurement During

@@ -9,6 +9,17 @@
     sigma_G^2 p.sigma_g2        rad2/s2   gyroscope variance per sample (noise density^2 times half the sample rate)
     sigma_A^2 p.sigma_a2        m2/s4     accelerometer variance per sample
 
+From one sample to the next, dt later, with g+, a+ and y_G of the one before; the terms up to the order count:
+
+    Phi = I - A + A^2 / 2 - A^3 / 6                                                           (15)
+    K_g = -dt [g x] + dt / 2 (A [g x] + [A g x]) - dt / 6 (A A [g x] + [A A g x] + A [A g x])    (14)
+    g- = Phi g+,   a- = c_a a+                                                                (10), (12)
+    Q = diag(sigma_G^2 K_g K_g', c_b^2 I)                                                     (16)
+
+and the Kalman filter corrects both by the accelerometer:
+
+    y_A = g + a   with variance sigma_A^2 on each axis                                        (11), (17)
+
 The paper's Case 1 takes the process noise (14) of the same order as the integration (15), its Case 2 that of order 1.
 
 Differences from the paper: M = sigma_A^2 I is diagonal, so the three axes of y_A correct one after the other, with the
@@ -154,6 +165,10 @@ order with the process noise of the first. The remaining error of fast turns is 
 sample before is late: gyro_index 2 removes most of it. The filter has no gyroscope bias state: remove a constant bias
 first. Sustained acceleration (cornering, braking) tilts the estimate. Heading is not estimated.""",
     reference="J. K. Lee, M. J. Choi, Sensors 18(9), 2018, 2775, doi:10.3390/s18092775",
+    when="""Use it where angular rate times sample period passes some 0.1 rad: fast turns, or a low sample rate.
+Gravity and acceleration are both states, so that a gentle acceleration is followed rather than rejected.
+Instead: lee2012 where turns are slow; rizun2008 where vigorous motion does not end; plumb where the gyroscope has a
+bias or the acceleration lasts, as in a vehicle; plumb or zihajehzadeh2014 for heading.""",
     inputs=(v.GYRO, v.ACCEL),
     outputs=(v.ROLL, v.PITCH, v.VERTICAL, v.EXTERNAL_ACCELERATION, v.TILT_STD, v.STATUS),
     locals=(

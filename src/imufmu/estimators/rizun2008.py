@@ -182,6 +182,11 @@ bias b tilts the estimate by sqrt(2) b / cut-off, so remove it first, or raise t
 long as 1 / cut-off is taken for gravity. Heading is not estimated.""",
     reference="P. Rizun, Optimal Wiener Filter for a Body Mounted Inertial Attitude Sensor, Journal of Navigation 61, "
     "2008, doi:10.1017/S0373463308004736",
+    when="""Use it where the motion goes on and on - a shoe, a ball, a tool, a body in the water - and where two
+numbers shall be all there is to tune, or a linear filter with a known frequency response is wanted. It is the best of
+the papers' filters on hand-held recordings and in long turns.
+Instead: plumb where the gyroscope has a bias, where rest should be used, or where acceleration lasts as long as 1 /
+cut-off; lee2012 where rest and short bursts alternate; plumb or zihajehzadeh2014 for heading.""",
     inputs=(v.GYRO, v.ACCEL),
     outputs=(v.ROLL, v.PITCH, v.VERTICAL, v.EXTERNAL_ACCELERATION, v.TILT_STD, v.STATUS),
     locals=(

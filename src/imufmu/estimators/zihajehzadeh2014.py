@@ -14,6 +14,16 @@
 Both are filters of a direction as in direction_filter, with C1 = g I and C2 = I: (5) to (16) are (12) to (29) there;
 (18), (20) and (27) are (24), (12) and (15).
 
+The yaw filter measures x2, h = 1, by z2: the direction of East of a sensor with roll gamma and pitch beta from the tilt
+filter, whose field, levelled, points to where m_ref points. It counts while norm and dip of the field are undisturbed:
+
+    t = Ry(beta) Rx(gamma) y_M                                                               (23), (24)
+    alpha_m = atan2(t_x m_y - t_y m_x, t_x m_x + t_y m_y),   m = m_ref
+    z2_x = cos beta cos alpha_m,   z2_y = sin gamma sin beta cos alpha_m - cos gamma sin alpha_m
+    z2_z = cos gamma sin beta cos alpha_m + sin gamma sin alpha_m                            (25)
+    abs(|y_M| - h) < eps_M,   abs(theta_dip - theta_dip,0) < eps_dip                         (26)
+    alpha = atan2(-cos gamma x2_y + sin gamma x2_z, x2_x / cos beta)                         (28)
+
 Differences from the paper: (25) has the plus that the print lost; z2 is row 1 of (2). (26) compares the norm of y_M
 with h and takes the dip from x1+(k); its infinity is no update at all. Q uses x(k-1) as in (15) and (27), unlike (8)
 and (21). x2 is normalised like x1. Arctangents have two arguments. (28) divides by cos(beta); within 0.6 deg of a
@@ -216,6 +226,10 @@ exceed the gyroscope's bias; so a disturbance that stays, or one that turns the 
 Without magnetometer (not connected: status 16) yaw counts from the start and drifts. An error of tilt becomes one of
 yaw, times tan(dip).""",
     reference="S. Zihajehzadeh, D. Loh, M. Lee, R. Hoskinson, E. J. Park, EMBC 2014, doi:10.1109/EMBC.2014.6945062",
+    when="""Use it for the orientation of a body segment or a tool with a magnetometer, in a place whose field is
+known and disturbed now and then, and where a disturbance must never reach the tilt.
+Instead: plumb, which needs no field of the place, finds the bias of the gyroscope and keeps the same promise about
+the tilt; lee2012 for the tilt alone, which is the same here.""",
     inputs=(v.GYRO, v.ACCEL, v.MAG),
     outputs=(
         v.ROLL,

@@ -14,6 +14,8 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from .. import __version__
 from ..blocks.block import Block, SampledBlock
 from ..blocks.signals import Parameter, Signal
+from .datasheet import rule_for, sheet_rows
+from .prose import paragraphs, section, words
 
 
 def signal_rows(signals: tuple[Signal, ...]) -> list[dict[str, str]]:
@@ -36,15 +38,15 @@ def signal_rows(signals: tuple[Signal, ...]) -> list[dict[str, str]]:
     return rows
 
 
-def equations(block: Block) -> str:
-    """The module docstring of the block: its equations, symbols and source; then those of the modules it names.
+def modules(block: Block) -> list[tuple[str, str]]:
+    """Names and docstrings of the module of the block, with its equations, symbols and source, and of those it names.
 
     A name with an underscore, or behind the word "module", is one where such a module of the same room is loaded; where
     the block has a folder of its own, so is every word that a module there is called by.
     """
     module = inspect.getmodule(block.output)
     if module is None:
-        return ""
+        return []
     folder = module.__name__.rpartition(".")[0]
     room = ".".join(folder.split(".")[:2])
     text = inspect.cleandoc(module.__doc__ or "")
@@ -52,19 +54,30 @@ def equations(block: Block) -> str:
     own = re.findall(r"\b[a-z]\w*", text) if folder != room else []
     wanted = dict.fromkeys([*(f"{folder}.{name}" for name in own), *(f"{room}.{name}" for name in names)])
     parts = [sys.modules[name] for name in wanted if name in sys.modules and name != module.__name__]
-    docs = [f"{part.__name__.rpartition('.')[2]}\n\n{inspect.cleandoc(part.__doc__ or '')}" for part in parts]
-    return "\n\n\n".join([text, *docs])
+    found = [(part.__name__.rpartition(".")[2], inspect.cleandoc(part.__doc__ or "")) for part in parts]
+    return [(block.name, text), *found]
 
 
 def documentation_page(block: Block, platforms: Sequence[str] = ()) -> str:
     """HTML page of the block's FMU. platforms: those of a native FMU; none for the Python FMU."""
     environment = Environment(loader=PackageLoader("imufmu.fmi"), autoescape=True, undefined=StrictUndefined)
+    names = {signal.name for signal in (*block.inputs, *block.parameters, *block.reported)}
+
+    def drawn(text: str) -> str:
+        return "\n".join(f"<p>{words(part, names)}</p>" for part in paragraphs(text))
+
     return environment.get_template("documentation.html").render(
         block=block,
         platforms=platforms,
         version=__version__,
         sampled=isinstance(block, SampledBlock),
-        equations=equations(block),
+        what=drawn(block.doc),
+        when=drawn(block.when),
+        reference=words(block.reference),
+        equations=[(name, section(text, names)) for name, text in modules(block)],
+        sheet=sheet_rows(block),
+        has_variance=any(signal.unit == "rad2/s2" and rule_for(signal) for signal in block.parameters),
+        needs_bias_removed=isinstance(block, SampledBlock) and not any("bias" in name for name in names),
         tables={
             "Inputs": signal_rows(block.inputs),
             "Parameters": signal_rows(block.parameters),

@@ -177,6 +177,10 @@ on a turntable: a turn slower than rr_b that lasts longer than rr_t is taken for
 acceleration that sets in gently and free of any turn, as in a lift or a train: it becomes tilt. A saturated
 accelerometer is not noticed.""",
     reference="Model of velocity: T. Rizun, Journal of Navigation 61, 2008, doi:10.1017/S0373463308004736",
+    when="""Use it first: it needs no tuning, finds the bias of the gyroscope, and tells by tilt_std how far to trust
+it. In a vehicle connect the speed of its wheels.
+Instead: rizun2008 where a linear filter with a known frequency response is asked for; lee2012 or leechoi2018 as
+references, or where the step must be as small as can be; bennett2014 for two links in a plane.""",
     inputs=(v.GYRO, v.ACCEL, v.MAG, *vehicle.INPUTS),
     outputs=(
         v.ROLL,
