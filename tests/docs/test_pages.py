@@ -102,6 +102,7 @@ def follow(page: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFi
         printed = capsys.readouterr().out
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("page", RUN, ids=name_of)
 def test_what_a_page_says_to_type_works(page, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)

@@ -53,6 +53,7 @@ def test_results_of_the_readme_are_those_of_the_pages():
             assert cells[1:] == [cars[system][estimators.index(column)] for system in systems], name
 
 
+@pytest.mark.long
 def test_demo_table_is_what_the_demo_prints(tmp_path):
     for row in run_demo(tmp_path).table.rows:
         assert f"| {' | '.join(row)} |" in PAGES["parameters"], row

@@ -11,6 +11,7 @@ import sys
 import pytest
 
 from imufmu.blocks.block import Block
+from imufmu.blocks.series import series
 from imufmu.fmi.datasheet import rule_for, sheet_rows
 from imufmu.fmi.documentation import documentation_page, modules
 from imufmu.fmi.prose import paragraphs, section, words
@@ -65,6 +66,16 @@ def test_every_estimator_shows_equations_says_when_to_use_it_and_how_to_set_it(b
     assert "/√Hz" in part(page, "Set it for your IMU")
     assert "deg/h" in part(page, "Set it for your IMU")
     assert "<b>S</b>" in page and "<b>N</b>" in page
+
+
+def test_a_series_tells_of_each_of_its_blocks() -> None:
+    chain = [BLOCKS[name] for name in ("pendulum", "imu", "lee2012")]
+    page = documentation_page(series(*chain))
+    for block in chain:
+        assert words(paragraphs(block.doc)[0], {s.name for s in block.parameters})[:60] in part(page, "What it does")
+        assert f"<h3>{block.name}</h3>" in part(page, "Equations")
+    assert "<h3>direction_filter</h3>" in part(page, "Equations")
+    assert "imu.gyro_noise_density" in part(page, "Set it for your IMU")
 
 
 def test_the_page_follows_the_screen_in_width_and_brightness() -> None:

@@ -13,6 +13,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from .. import __version__
 from ..blocks.block import Block, SampledBlock
+from ..blocks.series import Series
 from ..blocks.signals import Parameter, Signal
 from .datasheet import rule_for, sheet_rows
 from .prose import paragraphs, section, words
@@ -61,20 +62,21 @@ def modules(block: Block) -> list[tuple[str, str]]:
 def documentation_page(block: Block, platforms: Sequence[str] = ()) -> str:
     """HTML page of the block's FMU. platforms: those of a native FMU; none for the Python FMU."""
     environment = Environment(loader=PackageLoader("imufmu.fmi"), autoescape=True, undefined=StrictUndefined)
-    names = {signal.name for signal in (*block.inputs, *block.parameters, *block.reported)}
+    parts = block.blocks if isinstance(block, Series) else (block,)
+    names = {signal.name for part in parts for signal in (*part.inputs, *part.parameters, *part.reported)}
 
     def drawn(text: str) -> str:
-        return "\n".join(f"<p>{words(part, names)}</p>" for part in paragraphs(text))
+        return "\n".join(f"<p>{words(paragraph, names)}</p>" for paragraph in paragraphs(text))
 
     return environment.get_template("documentation.html").render(
         block=block,
         platforms=platforms,
         version=__version__,
         sampled=isinstance(block, SampledBlock),
-        what=drawn(block.doc),
-        when=drawn(block.when),
+        what=[(part.name, drawn(part.doc)) for part in parts],
+        when=drawn(parts[-1].when),
         reference=words(block.reference),
-        equations=[(name, section(text, names)) for name, text in modules(block)],
+        equations={name: section(text, names) for part in parts for name, text in modules(part)},
         sheet=sheet_rows(block),
         has_variance=any(signal.unit == "rad2/s2" and rule_for(signal) for signal in block.parameters),
         needs_bias_removed=isinstance(block, SampledBlock) and not any("bias" in name for name in names),
