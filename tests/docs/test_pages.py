@@ -24,7 +24,7 @@ from support.places import ROOT
 SLOW = re.compile(r"imufmu (validate|speed|demo)\b|imufmu run vehicle_|imufmu benchmark \w+$|--animate")
 RUN = [page for page in PAGES if any(fence.language in ("sh", "python") for fence in fences(page))]
 RUN = [page for page in RUN if "models" not in page.parts]  # they draw figures of the repository
-SLOWLY = [page for page in RUN if any(SLOW.search(fence.text) for fence in fences(page))]
+SLOWLY = [page for page in RUN if any(SLOW.search(line) for fence in fences(page) for line in shell_lines(fence.text))]
 
 
 def understood(line: str, *, whole: bool = True) -> None:

@@ -229,7 +229,7 @@ yaw, times tan(dip).""",
     when="""Use it for the orientation of a body segment or a tool with a magnetometer, in a place whose field is
 known and disturbed now and then, and where a disturbance must never reach the tilt.
 Instead: plumb, which needs no field of the place, finds the bias of the gyroscope and keeps the same promise about
-the tilt; lee2012 for the tilt alone, which is the same here.""",
+the tilt; lee2012 in mode 1 for the tilt alone, which is the same.""",
     inputs=(v.GYRO, v.ACCEL, v.MAG),
     outputs=(
         v.ROLL,
