@@ -21,7 +21,7 @@ from imufmu.files.csv_table import write_csv
 from support.pages import PAGES, anchors, commands, fences, links, mentions, name_of, shell_lines
 from support.places import ROOT
 
-SLOW = re.compile(r"imufmu (validate|speed|demo)\b|imufmu run vehicle_|imufmu benchmark \w+$|--animate")
+SLOW = re.compile(r"imufmu (validate|speed|demo)\b|imufmu run vehicle_|--animate")
 RUN = [page for page in PAGES if any(fence.language in ("sh", "python") for fence in fences(page))]
 RUN = [page for page in RUN if "models" not in page.parts]  # they draw figures of the repository
 SLOWLY = [page for page in RUN if any(SLOW.search(line) for fence in fences(page) for line in shell_lines(fence.text))]
