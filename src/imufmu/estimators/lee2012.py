@@ -9,15 +9,16 @@
     sigma_A^2 p.sigma_a2        m2/s4     accelerometer variance per sample
     eps_A     p.eps_a           m/s2
 
-(12) to (29) stand in direction_filter. Mode 1 takes c_a as it is, modes 2 and 3 take 0 for it; mode 3 measures only
-where the accelerometer's norm was that of gravity in each of the last n + 1 samples:
+Mode 1 takes c_a as it is, modes 2 and 3 take 0 for it; mode 3 measures only where the accelerometer's norm was that of
+gravity in each of the last n + 1 samples:
 
     roll = atan2(Z_2, Z_3),   pitch = atan2(-Z_1, sqrt(Z_2^2 + Z_3^2))                        (4)
     abs(|y_A| - g) <= eps_A                                                                   (30)
 
 Differences from the paper: roll uses the two-argument arctangent and pitch atan2(-Z1, hypot(Z2, Z3)), which equals (4)
 where (4) can be computed. A threshold that is not met means no update at all (the limit of an infinite variance). A
-sample that is not finite is predicted over; the first usable accelerometer sample starts the filter.
+sample that is not finite is predicted over; the first usable accelerometer sample starts the filter. (12) to (29) stand
+in direction_filter.
 
 [1] Lee, Park, Robinovitch, Estimation of Attitude and External Acceleration Using Inertial Sensor Measurement During
     Various Dynamic Conditions, IEEE TIM 61(8), 2012, doi:10.1109/TIM.2012.2187245
