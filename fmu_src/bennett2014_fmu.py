@@ -1,8 +1,7 @@
 """FMU of the Kalman filter for two links of Bennett, Jafari and Gans (2014)."""
 
-from imufmu.estimators import bennett2014
 from imufmu.fmi.slave import BlockSlave
 
 
 class Bennett2014(BlockSlave):
-    block = bennett2014.BLOCK
+    where = "imufmu.estimators.bennett2014:BLOCK"

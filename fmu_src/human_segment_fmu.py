@@ -1,8 +1,7 @@
 """FMU of a sensor on a segment of a moving person."""
 
 from imufmu.fmi.slave import BlockSlave
-from imufmu.plants import human
 
 
 class HumanSegment(BlockSlave):
-    block = human.BLOCK
+    where = "imufmu.plants.human:BLOCK"

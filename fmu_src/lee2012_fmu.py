@@ -1,8 +1,7 @@
 """FMU of the gravity-direction Kalman filter of Lee, Park and Robinovitch (2012)."""
 
-from imufmu.estimators import lee2012
 from imufmu.fmi.slave import BlockSlave
 
 
 class Lee2012(BlockSlave):
-    block = lee2012.BLOCK
+    where = "imufmu.estimators.lee2012:BLOCK"

@@ -1,8 +1,7 @@
 """FMU of the planar pendulum with one link."""
 
 from imufmu.fmi.slave import BlockSlave
-from imufmu.plants import pendulum
 
 
 class Pendulum(BlockSlave):
-    block = pendulum.PENDULUM
+    where = "imufmu.plants.pendulum:PENDULUM"

@@ -1,8 +1,7 @@
 """FMU of the optimal Wiener filter of Rizun (2008)."""
 
-from imufmu.estimators import rizun2008
 from imufmu.fmi.slave import BlockSlave
 
 
 class Rizun2008(BlockSlave):
-    block = rizun2008.BLOCK
+    where = "imufmu.estimators.rizun2008:BLOCK"

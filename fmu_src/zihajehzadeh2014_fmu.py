@@ -1,8 +1,7 @@
 """FMU of the cascade of tilt and yaw Kalman filters of Zihajehzadeh et al. (2014)."""
 
-from imufmu.estimators import zihajehzadeh2014
 from imufmu.fmi.slave import BlockSlave
 
 
 class Zihajehzadeh2014(BlockSlave):
-    block = zihajehzadeh2014.BLOCK
+    where = "imufmu.estimators.zihajehzadeh2014:BLOCK"

@@ -85,10 +85,15 @@ static bool is_settable(Instance *c, fmi2ValueReference reference, Type type, do
    of a result tells by itself that the variable is Real, and an input takes any value at any time. */
 
 static bool are_inputs(const fmi2ValueReference vr[], size_t n) {
+#if N_INPUTS > 0
     for (size_t i = 0; i < n; i++) {
         if (vr[i] >= N_INPUTS) return false;
     }
     return true;
+#else
+    (void)vr;
+    return n == 0;
+#endif
 }
 
 /* Whether all are outputs or locals. */

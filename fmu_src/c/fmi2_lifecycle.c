@@ -25,8 +25,9 @@ fmi2Component fmi2Instantiate(fmi2String instanceName, fmi2Type fmuType, fmi2Str
                                              "; modelDescription.xml and binary are of different builds");
     }
     size_t name_size = strlen(instanceName) + 1;
-    Instance *c = calloc(1, sizeof *c + name_size);
+    Instance *c = (Instance *)calloc(1, sizeof *c + name_size);
     if (!c) return cannot_instantiate(functions, instanceName, MODEL_NAME ": out of memory");
+    c->name = (char *)(c + 1);
     memcpy(c->name, instanceName, name_size);
     if (functions) c->host = *functions;
     c->log_warnings = loggingOn;
@@ -39,7 +40,7 @@ void fmi2FreeInstance(fmi2Component c) { free(c); }
 
 /* Switch the named categories, or all of them if none is named; switching some on switches the others off. */
 fmi2Status fmi2SetDebugLogging(fmi2Component component, fmi2Boolean loggingOn, size_t n, const fmi2String categories[]) {
-    Instance *c = component;
+    Instance *c = instance_of(component);
     if (!c || !is_given(c, "fmi2SetDebugLogging", categories, n)) return fmi2Error;
     bool warnings = n == 0, errors = n == 0;
     for (size_t i = 0; i < n; i++) {
@@ -62,7 +63,7 @@ fmi2Status fmi2SetDebugLogging(fmi2Component component, fmi2Boolean loggingOn, s
 /* The end of the experiment and a tolerance change nothing here. */
 fmi2Status fmi2SetupExperiment(fmi2Component component, fmi2Boolean toleranceDefined, fmi2Real tolerance,
                                fmi2Real startTime, fmi2Boolean stopTimeDefined, fmi2Real stopTime) {
-    Instance *c = component;
+    Instance *c = instance_of(component);
     (void)toleranceDefined, (void)tolerance, (void)stopTimeDefined, (void)stopTime;
     if (!in_phase(c, "fmi2SetupExperiment", INSTANTIATED)) return fmi2Error;
     if (!isfinite(startTime)) return refuse(c, "start time %g is not a time", startTime);
@@ -70,16 +71,19 @@ fmi2Status fmi2SetupExperiment(fmi2Component component, fmi2Boolean toleranceDef
     return fmi2OK;
 }
 
-fmi2Status fmi2EnterInitializationMode(fmi2Component component) {
-    Instance *c = component;
-    if (!in_phase(c, "fmi2EnterInitializationMode", INSTANTIATED)) return fmi2Error;
-    c->state.phase = INITIALISING;
+static fmi2Status move(Instance *c, const char *function, int from, int to) {
+    if (!in_phase(c, function, from)) return fmi2Error;
+    c->state.phase = to;
     return fmi2OK;
+}
+
+fmi2Status fmi2EnterInitializationMode(fmi2Component c) {
+    return move(instance_of(c), "fmi2EnterInitializationMode", INSTANTIATED, INITIALISING);
 }
 
 /* With a parameter out of its range the instance stays in initialisation mode: the host may correct it. */
 fmi2Status fmi2ExitInitializationMode(fmi2Component component) {
-    Instance *c = component;
+    Instance *c = instance_of(component);
     if (!in_phase(c, "fmi2ExitInitializationMode", INITIALISING)) return fmi2Error;
     if (!parameters_are_good(c)) {
         char problems[MESSAGE_SIZE];
@@ -92,15 +96,12 @@ fmi2Status fmi2ExitInitializationMode(fmi2Component component) {
     return fmi2OK;
 }
 
-fmi2Status fmi2Terminate(fmi2Component component) {
-    Instance *c = component;
-    if (!in_phase(c, "fmi2Terminate", STEPPING)) return fmi2Error;
-    c->state.phase = TERMINATED;
-    return fmi2OK;
+fmi2Status fmi2Terminate(fmi2Component c) {
+    return move(instance_of(c), "fmi2Terminate", STEPPING, TERMINATED);
 }
 
 fmi2Status fmi2Reset(fmi2Component component) {
-    Instance *c = component;
+    Instance *c = instance_of(component);
     if (!c) return fmi2Error;
     to_start_values(&c->state);
     return fmi2OK;

@@ -1,48 +1,50 @@
 /* FMI functions: the whole state, kept in memory or as bytes. */
 
 typedef struct {
-    char guid[40]; /* of the block that it belongs to */
+    char guid[40];     /* of the block that it belongs to */
+    uint64_t checksum; /* of a serialised state: the host may have changed its bytes */
     State state;
 } Snapshot;
 
+/* FNV-1a: another byte anywhere gives another number. */
+static uint64_t checksum(const State *state) {
+    const unsigned char *bytes = (const unsigned char *)state;
+    uint64_t sum = 14695981039346656037u;
+    for (size_t i = 0; i < sizeof *state; i++) sum = (sum ^ bytes[i]) * 1099511628211u;
+    return sum;
+}
+
+static bool is_ours(const Snapshot *snapshot) { return memcmp(snapshot->guid, MODEL_GUID, sizeof MODEL_GUID) == 0; }
+
+/* The snapshot that a host keeps, a new one if it has none yet; NULL with a message if there is no memory. */
+static Snapshot *room_for(Instance *c, fmi2FMUstate *kept) {
+    if (!*kept) *kept = calloc(1, sizeof(Snapshot));
+    if (!*kept) refuse(c, "out of memory");
+    return (Snapshot *)*kept;
+}
+
 fmi2Status fmi2GetFMUstate(fmi2Component component, fmi2FMUstate *kept) {
-    Instance *c = component;
+    Instance *c = instance_of(component);
     if (!c) return fmi2Error;
     if (!kept) return refuse(c, "fmi2GetFMUstate got no place for the state");
-    if (!*kept) *kept = calloc(1, sizeof(Snapshot));
-    Snapshot *snapshot = *kept;
-    if (!snapshot) return refuse(c, "out of memory");
+    Snapshot *snapshot = room_for(c, kept);
+    if (!snapshot) return fmi2Error;
     memcpy(snapshot->guid, MODEL_GUID, sizeof MODEL_GUID);
     snapshot->state = c->state;
     return fmi2OK;
 }
 
-/* Whether a snapshot is one of this block. Bytes that the host kept may be anything. */
-static bool is_ours(const Snapshot *snapshot) {
-    if (memcmp(snapshot->guid, MODEL_GUID, sizeof MODEL_GUID) != 0) return false;
-    for (int i = 0; i < N_VARIABLES; i++) {
-        double value = snapshot->state.values[i];
-        if (VARIABLES[i].type != REAL && !(INT32_MIN <= value && value <= INT32_MAX)) return false;
-    }
-    switch (snapshot->state.phase) {
-        case INSTANTIATED:
-        case INITIALISING:
-        case STEPPING:
-        case TERMINATED: return true;
-        default: return false;
-    }
-}
-
 fmi2Status fmi2SetFMUstate(fmi2Component component, fmi2FMUstate kept) {
-    Instance *c = component;
+    Instance *c = instance_of(component);
+    const Snapshot *snapshot = (const Snapshot *)kept;
     if (!c) return fmi2Error;
-    if (!kept || !is_ours(kept)) return refuse(c, "the state is that of another FMU and was not set");
-    c->state = ((Snapshot *)kept)->state;
+    if (!snapshot || !is_ours(snapshot)) return refuse(c, "the state is that of another FMU and was not set");
+    c->state = snapshot->state;
     return fmi2OK;
 }
 
-fmi2Status fmi2FreeFMUstate(fmi2Component component, fmi2FMUstate *kept) {
-    if (!component) return fmi2Error;
+fmi2Status fmi2FreeFMUstate(fmi2Component c, fmi2FMUstate *kept) {
+    if (!c) return fmi2Error;
     if (kept) {
         free(*kept);
         *kept = NULL;
@@ -50,35 +52,37 @@ fmi2Status fmi2FreeFMUstate(fmi2Component component, fmi2FMUstate *kept) {
     return fmi2OK;
 }
 
-fmi2Status fmi2SerializedFMUstateSize(fmi2Component component, fmi2FMUstate kept, size_t *size) {
-    Instance *c = component;
+fmi2Status fmi2SerializedFMUstateSize(fmi2Component c, fmi2FMUstate kept, size_t *size) {
     if (!c) return fmi2Error;
-    if (!kept || !size) return refuse(c, "fmi2SerializedFMUstateSize got no state");
+    if (!kept || !size) return refuse(instance_of(c), "fmi2SerializedFMUstateSize got no state");
     *size = sizeof(Snapshot);
     return fmi2OK;
 }
 
-fmi2Status fmi2SerializeFMUstate(fmi2Component component, fmi2FMUstate kept, fmi2Byte bytes[], size_t size) {
-    Instance *c = component;
+fmi2Status fmi2SerializeFMUstate(fmi2Component c, fmi2FMUstate kept, fmi2Byte bytes[], size_t size) {
     if (!c) return fmi2Error;
     if (!kept || !bytes || size < sizeof(Snapshot)) {
-        return refuse(c, "fmi2SerializeFMUstate got no state, or less room than its %u bytes", (unsigned)sizeof(Snapshot));
+        return refuse(instance_of(c), "fmi2SerializeFMUstate got no state, or less room than its %u bytes",
+                      (unsigned)sizeof(Snapshot));
     }
-    memcpy(bytes, kept, sizeof(Snapshot));
+    Snapshot *snapshot = (Snapshot *)kept;
+    snapshot->checksum = checksum(&snapshot->state);
+    memcpy(bytes, snapshot, sizeof *snapshot);
     return fmi2OK;
 }
 
 fmi2Status fmi2DeSerializeFMUstate(fmi2Component component, const fmi2Byte bytes[], size_t size, fmi2FMUstate *kept) {
-    Instance *c = component;
-    Snapshot snapshot;
+    Instance *c = instance_of(component);
+    Snapshot given;
     if (!c) return fmi2Error;
-    if (!bytes || !kept || size != sizeof snapshot) {
-        return refuse(c, "a serialised state has %u bytes, not %u", (unsigned)sizeof snapshot, (unsigned)size);
+    if (!bytes || !kept) return refuse(c, "fmi2DeSerializeFMUstate got no bytes, or no place for the state");
+    bool is_whole = size == sizeof given;
+    if (is_whole) memcpy(&given, bytes, sizeof given);
+    if (!is_whole || !is_ours(&given) || given.checksum != checksum(&given.state)) {
+        return refuse(c, "the serialised state was changed, or is that of another FMU or another build");
     }
-    memcpy(&snapshot, bytes, sizeof snapshot);
-    if (!is_ours(&snapshot)) return refuse(c, "the serialised state is that of another FMU or another build");
-    if (!*kept) *kept = calloc(1, sizeof snapshot);
-    if (!*kept) return refuse(c, "out of memory");
-    memcpy(*kept, &snapshot, sizeof snapshot);
+    Snapshot *snapshot = room_for(c, kept);
+    if (!snapshot) return fmi2Error;
+    *snapshot = given;
     return fmi2OK;
 }

@@ -17,7 +17,7 @@ static fmi2Status report_missing_inputs(Instance *c) {
 }
 
 fmi2Status fmi2DoStep(fmi2Component component, fmi2Real t, fmi2Real h, fmi2Boolean noSetFMUStatePriorToCurrentPoint) {
-    Instance *c = component;
+    Instance *c = instance_of(component);
     (void)noSetFMUStatePriorToCurrentPoint;
     if (!in_phase(c, "fmi2DoStep", STEPPING)) return fmi2Error;
     if (!(isfinite(t) && isfinite(h) && h > 0)) {
@@ -32,48 +32,32 @@ fmi2Status fmi2DoStep(fmi2Component component, fmi2Real t, fmi2Real h, fmi2Boole
     return report_missing_inputs(c);
 }
 
-fmi2Status fmi2CancelStep(fmi2Component c) {
-    return c ? refuse(c, "no step is pending that could be cancelled") : fmi2Error;
+static fmi2Status there_is_none(fmi2Component c, const char *reason) {
+    return c ? refuse(instance_of(c), "%s", reason) : fmi2Error;
 }
 
-static fmi2Status never_pending(fmi2Component c, const void *value) {
-    (void)value;
-    return c ? fmi2Discard : fmi2Error;
-}
+fmi2Status fmi2CancelStep(fmi2Component c) { return there_is_none(c, "no step is pending that could be cancelled"); }
 
-fmi2Status fmi2GetStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Status *value) {
-    (void)kind;
-    return never_pending(c, value);
-}
+#define NEVER_PENDING(function, type)                                              \
+    fmi2Status function(fmi2Component c, const fmi2StatusKind kind, type *value) { \
+        (void)kind, (void)value;                                                   \
+        return c ? fmi2Discard : fmi2Error;                                        \
+    }
 
-fmi2Status fmi2GetRealStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Real *value) {
-    (void)kind;
-    return never_pending(c, value);
-}
-
-fmi2Status fmi2GetIntegerStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Integer *value) {
-    (void)kind;
-    return never_pending(c, value);
-}
-
-fmi2Status fmi2GetBooleanStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Boolean *value) {
-    (void)kind;
-    return never_pending(c, value);
-}
-
-fmi2Status fmi2GetStringStatus(fmi2Component c, const fmi2StatusKind kind, fmi2String *value) {
-    (void)kind;
-    return never_pending(c, value);
-}
+NEVER_PENDING(fmi2GetStatus, fmi2Status)
+NEVER_PENDING(fmi2GetRealStatus, fmi2Real)
+NEVER_PENDING(fmi2GetIntegerStatus, fmi2Integer)
+NEVER_PENDING(fmi2GetBooleanStatus, fmi2Boolean)
+NEVER_PENDING(fmi2GetStringStatus, fmi2String)
 
 fmi2Status fmi2SetRealInputDerivatives(fmi2Component c, const fmi2ValueReference vr[], size_t n,
                                        const fmi2Integer order[], const fmi2Real value[]) {
     (void)vr, (void)n, (void)order, (void)value;
-    return c ? refuse(c, "inputs are held over a step, not interpolated (canInterpolateInputs is false)") : fmi2Error;
+    return there_is_none(c, "inputs are held over a step, not interpolated (canInterpolateInputs is false)");
 }
 
 fmi2Status fmi2GetRealOutputDerivatives(fmi2Component c, const fmi2ValueReference vr[], size_t n,
                                         const fmi2Integer order[], fmi2Real value[]) {
     (void)vr, (void)n, (void)order, (void)value;
-    return c ? refuse(c, "there are no time derivatives of outputs (maxOutputDerivativeOrder is 0)") : fmi2Error;
+    return there_is_none(c, "there are no time derivatives of outputs (maxOutputDerivativeOrder is 0)");
 }

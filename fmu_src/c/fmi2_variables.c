@@ -24,21 +24,42 @@ static bool are_readable(Instance *c, const char *function, const fmi2ValueRefer
     return true;
 }
 
-fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference vr[], size_t n, fmi2Real value[]) {
-    if (!are_readable(c, "fmi2GetReal", vr, n, REAL, value)) return fmi2Error;
-    for (size_t i = 0; i < n; i++) value[i] = ((Instance *)c)->state.values[vr[i]];
+/* Element i of an array that a host gave, and what it is to hold. */
+static double element(Type type, const void *values, size_t i) {
+    switch (type) {
+        case REAL: return ((const fmi2Real *)values)[i];
+        case INTEGER: return ((const fmi2Integer *)values)[i];
+        default: return ((const fmi2Boolean *)values)[i] != fmi2False;
+    }
+}
+
+static void put(Type type, void *values, size_t i, double value) {
+    switch (type) {
+        case REAL: ((fmi2Real *)values)[i] = value; break;
+        case INTEGER: ((fmi2Integer *)values)[i] = (fmi2Integer)value; break;
+        default: ((fmi2Boolean *)values)[i] = value != 0.0;
+    }
+}
+
+static fmi2Status get(Instance *c, const char *function, Type type, const fmi2ValueReference vr[], size_t n,
+                      void *values) {
+    if (!are_readable(c, function, vr, n, type, values)) return fmi2Error;
+    for (size_t i = 0; i < n; i++) put(type, values, i, c->state.values[vr[i]]);
     return fmi2OK;
 }
 
-fmi2Status fmi2GetInteger(fmi2Component c, const fmi2ValueReference vr[], size_t n, fmi2Integer value[]) {
-    if (!are_readable(c, "fmi2GetInteger", vr, n, INTEGER, value)) return fmi2Error;
-    for (size_t i = 0; i < n; i++) value[i] = (fmi2Integer)((Instance *)c)->state.values[vr[i]];
-    return fmi2OK;
-}
-
-fmi2Status fmi2GetBoolean(fmi2Component c, const fmi2ValueReference vr[], size_t n, fmi2Boolean value[]) {
-    if (!are_readable(c, "fmi2GetBoolean", vr, n, BOOLEAN, value)) return fmi2Error;
-    for (size_t i = 0; i < n; i++) value[i] = ((Instance *)c)->state.values[vr[i]] != 0.0;
+/* All values or none: each is checked before the first is set. */
+static fmi2Status set(Instance *c, const char *function, Type type, const fmi2ValueReference vr[], size_t n,
+                      const void *values) {
+    if (!in_phase(c, function, WRITABLE)) return fmi2Error;
+    if (!is_given(c, function, vr, n) || !is_given(c, function, values, n)) return fmi2Error;
+    if (type != REAL || !are_inputs(vr, n)) {
+        for (size_t i = 0; i < n; i++) {
+            if (!is_settable(c, vr[i], type, element(type, values, i))) return fmi2Error;
+        }
+    }
+    for (size_t i = 0; i < n; i++) c->state.values[vr[i]] = element(type, values, i);
+    c->state.stale = true;
     return fmi2OK;
 }
 
@@ -47,55 +68,38 @@ static fmi2Status no_strings(Instance *c, const char *function, size_t n) {
     return n == 0 ? fmi2OK : refuse(c, "there are no string variables");
 }
 
+fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference vr[], size_t n, fmi2Real value[]) {
+    return get(instance_of(c), "fmi2GetReal", REAL, vr, n, value);
+}
+
+fmi2Status fmi2GetInteger(fmi2Component c, const fmi2ValueReference vr[], size_t n, fmi2Integer value[]) {
+    return get(instance_of(c), "fmi2GetInteger", INTEGER, vr, n, value);
+}
+
+fmi2Status fmi2GetBoolean(fmi2Component c, const fmi2ValueReference vr[], size_t n, fmi2Boolean value[]) {
+    return get(instance_of(c), "fmi2GetBoolean", BOOLEAN, vr, n, value);
+}
+
 fmi2Status fmi2GetString(fmi2Component c, const fmi2ValueReference vr[], size_t n, fmi2String value[]) {
     (void)vr, (void)value;
-    return no_strings(c, "fmi2GetString", n);
+    return no_strings(instance_of(c), "fmi2GetString", n);
 }
 
-/* All values or none: each is checked before the first is set. */
-static bool are_writable(Instance *c, const char *function, const fmi2ValueReference vr[], size_t n,
-                         const void *values) {
-    return in_phase(c, function, WRITABLE) && is_given(c, function, vr, n) && is_given(c, function, values, n);
+fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference vr[], size_t n, const fmi2Real value[]) {
+    return set(instance_of(c), "fmi2SetReal", REAL, vr, n, value);
 }
 
-fmi2Status fmi2SetReal(fmi2Component component, const fmi2ValueReference vr[], size_t n, const fmi2Real value[]) {
-    Instance *c = component;
-    if (!are_writable(c, "fmi2SetReal", vr, n, value)) return fmi2Error;
-    if (!are_inputs(vr, n)) {
-        for (size_t i = 0; i < n; i++) {
-            if (!is_settable(c, vr[i], REAL, value[i])) return fmi2Error;
-        }
-    }
-    for (size_t i = 0; i < n; i++) c->state.values[vr[i]] = value[i];
-    c->state.stale = true;
-    return fmi2OK;
+fmi2Status fmi2SetInteger(fmi2Component c, const fmi2ValueReference vr[], size_t n, const fmi2Integer value[]) {
+    return set(instance_of(c), "fmi2SetInteger", INTEGER, vr, n, value);
 }
 
-fmi2Status fmi2SetInteger(fmi2Component component, const fmi2ValueReference vr[], size_t n, const fmi2Integer value[]) {
-    Instance *c = component;
-    if (!are_writable(c, "fmi2SetInteger", vr, n, value)) return fmi2Error;
-    for (size_t i = 0; i < n; i++) {
-        if (!is_settable(c, vr[i], INTEGER, value[i])) return fmi2Error;
-    }
-    for (size_t i = 0; i < n; i++) c->state.values[vr[i]] = value[i];
-    c->state.stale = true;
-    return fmi2OK;
-}
-
-fmi2Status fmi2SetBoolean(fmi2Component component, const fmi2ValueReference vr[], size_t n, const fmi2Boolean value[]) {
-    Instance *c = component;
-    if (!are_writable(c, "fmi2SetBoolean", vr, n, value)) return fmi2Error;
-    for (size_t i = 0; i < n; i++) {
-        if (!is_settable(c, vr[i], BOOLEAN, value[i] != 0)) return fmi2Error;
-    }
-    for (size_t i = 0; i < n; i++) c->state.values[vr[i]] = value[i] != 0;
-    c->state.stale = true;
-    return fmi2OK;
+fmi2Status fmi2SetBoolean(fmi2Component c, const fmi2ValueReference vr[], size_t n, const fmi2Boolean value[]) {
+    return set(instance_of(c), "fmi2SetBoolean", BOOLEAN, vr, n, value);
 }
 
 fmi2Status fmi2SetString(fmi2Component c, const fmi2ValueReference vr[], size_t n, const fmi2String value[]) {
     (void)vr, (void)value;
-    return no_strings(c, "fmi2SetString", n);
+    return no_strings(instance_of(c), "fmi2SetString", n);
 }
 
 /* Of outputs with respect to inputs. A continuous block answers for the present time, a sampled one for its last sample
@@ -104,7 +108,7 @@ fmi2Status fmi2GetDirectionalDerivative(fmi2Component component, const fmi2Value
                                         const fmi2ValueReference known[], size_t n_known, const fmi2Real d_known[],
                                         fmi2Real d_unknown[]) {
     const char *function = "fmi2GetDirectionalDerivative";
-    Instance *c = component;
+    Instance *c = instance_of(component);
     double du[N_INPUTS + 1] = {0}, dy[N_OUTPUTS + 1];
     if (!are_readable(c, function, unknown, n_unknown, REAL, d_unknown)) return fmi2Error;
     if (!are_readable(c, function, known, n_known, REAL, d_known)) return fmi2Error;

@@ -1,6 +1,6 @@
 /* FMI 2.0 co-simulation FMU of one imufmu block.
 
-   The only file to compile. It includes the others, in reading order, into one translation unit: everything but the FMI
+   The only file to compile, as C99 or as C++17. It includes the others, in reading order, into one translation unit: everything but the FMI
    functions is static, so no name meets one of the host, of a library or of another FMU. block.c and equations.c are
    generated from the declaration of the block; the rest is the same for all blocks.
 
@@ -16,13 +16,28 @@
 #include <string.h>
 
 #include "fmi2Functions.h"
+#include "prefix.h"
 
-#pragma STDC FP_CONTRACT OFF /* the same rounding on every processor; for GCC this is -ffp-contract=off */
+/* The same rounding on every processor. GCC does not know this; there it is -ffp-contract=off. */
+#if defined(__clang__) || !defined(__GNUC__)
+#pragma STDC FP_CONTRACT OFF
+#endif
 
 #include "variable.h"
 #include "block.c"
+
+/* CasADi writes functions and arguments that are not always used, and conditions as numbers. */
+#ifdef __GNUC__
+#pragma GCC diagnostic push
+#pragma GCC diagnostic ignored "-Wunused-function"
+#pragma GCC diagnostic ignored "-Wunused-parameter"
+#pragma GCC diagnostic ignored "-Wfloat-conversion"
+#endif
 #define CASADI_SYMBOL_EXPORT static
 #include "equations.c"
+#ifdef __GNUC__
+#pragma GCC diagnostic pop
+#endif
 
 #include "instance.c"
 #include "noise.c"

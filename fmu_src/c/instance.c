@@ -26,8 +26,10 @@ typedef struct {
     casadi_int integer_work[N_INTEGER_WORK + 1];
     fmi2CallbackFunctions host;
     bool log_warnings, log_errors;
-    char name[]; /* of the instance */
+    char *name; /* of the instance; behind it */
 } Instance;
+
+static Instance *instance_of(fmi2Component component) { return (Instance *)component; }
 
 static double *inputs_of(Instance *c) { return c->state.values; }
 static double *parameters_of(Instance *c) { return c->state.values + N_INPUTS; }
@@ -76,7 +78,7 @@ static fmi2Status refuse(Instance *c, const char *format, ...) {
         int n = snprintf(message, sizeof message, MODEL_NAME ": ");
         va_list values;
         va_start(values, format);
-        vsnprintf(message + n, sizeof message - n, format, values);
+        vsnprintf(message + n, sizeof message - (size_t)n, format, values);
         va_end(values);
         report(&c->host, c->name, fmi2Error, message);
     }

@@ -17,7 +17,7 @@ static void draw(Instance *c, int64_t k) {
         for (int j = 0; j < stream->draws; j++) {
             uint64_t index = (uint64_t)k * (uint64_t)stream->draws + (uint64_t)j;
             uint64_t z = mix(start + (index + 1) * STRIDE);
-            *next++ = ((double)(z >> 12) + 0.5) * 0x1p-52; /* 52 bits and a half: never 0, never 1 */
+            *next++ = ((double)(z >> 12) + 0.5) * (1.0 / 4503599627370496.0); /* 2^52: 52 bits and a half: never 0, never 1 */
         }
     }
 }

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import math
 import re
 
@@ -14,9 +13,9 @@ from imufmu.blocks.block import SampledBlock
 from imufmu.blocks.vocabulary import Status
 from imufmu.registry import BLOCKS, ESTIMATORS
 from support import fmu
+from support.fmu import ERROR, WARNING, refusal
 
 NAMES = list(BLOCKS)
-WARNING, ERROR, FATAL = 1, 3, 4
 
 
 @pytest.fixture(params=fmu.KINDS)
@@ -25,21 +24,15 @@ def kind(request):
     return request.param
 
 
-def set_in_vain(instance, kind, values):
-    """Native FMUs answer fmi2Error; PythonFMU cannot say so from a setter, and the log has to do."""
-    with pytest.raises(FMICallException) if kind == "native" else contextlib.nullcontext():
-        instance.set(values)
-
-
 @pytest.mark.parametrize("name", NAMES)
 def test_a_parameter_out_of_bounds_ends_initialisation_with_its_name_value_and_range(kind, name):
     period = "sample_period" if any(p.name == "sample_period" for p in BLOCKS[name].parameters) else "max_step"
     instance = fmu.Fmu(name, kind=kind)
-    with pytest.raises(FMICallException, match="ExitInitializationMode"):
-        instance.initialise({period: -0.5})
-    messages = [message for status, message in instance.log if status == ERROR]
-    assert len(messages) == 1
-    assert f"{period} = -0.5 s is outside [" in messages[0]
+    instance.slave.setupExperiment(startTime=0.0)
+    instance.slave.enterInitializationMode()
+    instance.set({period: -0.5})
+    assert f"{period} = -0.5 s is outside [" in refusal(instance, instance.slave.exitInitializationMode)
+    instance.slave.freeInstance()
 
 
 def test_a_host_survives_hundreds_of_failed_initialisations_and_instances(kind):
@@ -63,11 +56,9 @@ def test_an_impossible_step_is_refused_and_changes_nothing(kind, t, h):
     instance.set(fmu.elements("gyro", (0.1, 0.2, 0.3)))
     instance.step(0.0, 0.05)
     before = instance.reals()
-    with pytest.raises(FMICallException):
-        instance.step(t, h)
-    assert [status for status, _ in instance.log] == [ERROR]
+    message = refusal(instance, lambda: instance.step(t, h))
     what, value = ("h", h) if t == 0.05 else ("t", t)
-    (written,) = re.findall(rf"\b{what} = (\S+) s", instance.log[0][1])
+    (written,) = re.findall(rf"\b{what} = (\S+) s", message)
     assert np.array_equal(float(written), value, equal_nan=True)
     assert instance.reals() == before
     instance.step(0.05, 0.05)
@@ -82,9 +73,7 @@ def test_a_step_in_which_the_solver_diverges_is_refused_and_changes_nothing(kind
     tried, spared = (fmu.Fmu("pendulum", kind=kind).initialise(stiff) for _ in range(2))
     for instance in (tried, spared):
         instance.step(0.0, 1e-4)
-    with pytest.raises(FMICallException):
-        tried.step(1e-4, 1000.0)
-    assert "max_step" in tried.log[-1][1]
+    assert "max_step" in refusal(tried, lambda: tried.step(1e-4, 1000.0))
     assert tried.reals() == spared.reals()
     for instance in (tried, spared):
         instance.step(1e-4, 1e-4)
@@ -134,25 +123,11 @@ def test_fixed_parameters_keep_their_value_once_the_simulation_runs_and_tunable_
     instance = fmu.Fmu("lee2012", kind=kind).initialise()
     instance.step(0.0, 0.01)
     instance.set({"c_a": 0.5})
-    set_in_vain(instance, kind, {"g": 5.0})
-    set_in_vain(instance, kind, {"sigma_a2": -1.0})
+    assert "g is fixed" in refusal(instance, lambda: instance.set({"g": 5.0}))
+    message = refusal(instance, lambda: instance.set({"sigma_a2": -1.0}))
+    assert "sigma_a2 = -1" in message and "is outside [1e-09, 1e+06]" in message
     assert instance.get("g", "c_a", "sigma_a2") == [9.8, 0.5, 1e-4]
-    messages = [message for status, message in instance.log if status == ERROR]
-    assert len(messages) == 2
-    assert "g is fixed" in messages[0]
-    assert "sigma_a2 = -1" in messages[1] and "is outside [1e-09, 1e+06]" in messages[1]
-    instance.close()
-
-
-def test_outputs_and_unknown_variables_cannot_be_set_and_do_not_crash_the_host(kind):
-    instance = fmu.Fmu("lee2012", kind=kind).initialise()
-    before = instance.reals()
-    set_in_vain(instance, kind, {"roll": 1.0})
-    for call in (lambda: instance.slave.setReal([100_000], [1.0]), lambda: instance.slave.getReal([100_000])):
-        with contextlib.suppress(FMICallException):
-            call()
-    assert instance.reals() == before
-    assert [status for status, _ in instance.log] == [ERROR] * 3
+    assert [status for status, _ in instance.log] == [ERROR] * 2
     instance.close()
 
 

@@ -21,7 +21,7 @@ from imufmu.compiled.compilers import PLATFORMS, own_platform, universal
 from imufmu.fmi import native
 from imufmu.fmi.build import BuildError, build_fmu
 from imufmu.fmi.model_description import guid
-from imufmu.fmi.native import build_native, cached_native_fmu, sources
+from imufmu.fmi.native import block_called, build_native, cached_native_fmu, sources
 from imufmu.fmi.native_table import generate
 from imufmu.registry import BLOCKS
 from support import fmu
@@ -93,20 +93,70 @@ def test_fmpy_compiles_the_sources_to_a_binary_with_the_same_results(tmp_path: P
     theirs.close()
 
 
+def written(name: str, folder: Path) -> Path:
+    """The sources of a block's FMU, in a new folder."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for file, content in sources(block_called(name)).items():
+        (folder / file).write_bytes(content)
+    return folder
+
+
+COMPILERS = {
+    "gcc": ("-std=c99",),
+    "clang": ("-std=c99",),
+    "g++": ("-x", "c++", "-std=c++17"),
+    "clang++": ("-x", "c++", "-std=c++17"),
+}
+
+
+@pytest.mark.parametrize("compiler", COMPILERS)
+@pytest.mark.parametrize("name", ["lee2012", "pendulum", "plumb", "handheld+imu+lee2012"])
+def test_compilers_of_c_and_of_c_plus_plus_are_silent(name: str, compiler: str, tmp_path: Path) -> None:
+    if not shutil.which(compiler):
+        pytest.skip(f"needs {compiler}")
+    strict = ("-Wall", "-Wextra", "-Wconversion", "-pedantic", "-Werror", "-fsyntax-only")
+    command = [compiler, *COMPILERS[compiler], *strict, "fmu.c"]
+    said = subprocess.run(command, cwd=written(name, tmp_path), capture_output=True, text=True)
+    assert (said.returncode, said.stderr) == (0, "")
+
+
 @pytest.mark.skipif(not shutil.which("cc"), reason="needs the system's C compiler")
-@pytest.mark.parametrize("name", ["lee2012", "pendulum", "imu"])
-def test_the_wrapper_compiles_without_a_warning(name: str, tmp_path: Path) -> None:
-    for file, content in sources(BLOCKS[name]).items():
-        (tmp_path / file).write_bytes(content)
-    said = subprocess.run(
-        ["cc", "-std=c99", "-fsyntax-only", "-Wall", "-Wextra", "-Wpedantic", "-Wno-unknown-pragmas", "fmu.c"],
-        cwd=tmp_path,
-        capture_output=True,
-        text=True,
-    )
-    warnings = [line for line in said.stderr.splitlines() if ": warning: " in line or ": error: " in line]
-    # CasADi writes functions and arguments that are not always used; that text is not ours.
-    assert [line for line in warnings if not line.startswith("equations.c:")] == []
+def test_sources_of_several_fmus_are_linked_into_one_program(tmp_path: Path) -> None:
+    """As the standard says: each compiled with the prefix of its name. The program asks each for its version."""
+    names, objects = ["lee2012", "imu", "imu+lee2012"], []
+    identifiers = [name.replace("+", "_") for name in names]
+    for name, identifier in zip(names, identifiers, strict=True):
+        prefix, target = f"-DFMI2_FUNCTION_PREFIX={identifier}_", tmp_path / f"{identifier}.o"
+        folder = written(name, tmp_path / identifier)
+        subprocess.run(["cc", "-std=c99", prefix, "-c", "fmu.c", "-o", target], cwd=folder, check=True)
+        objects.append(str(target))
+        table = subprocess.run(["nm", "-g", "--defined-only", target], capture_output=True, text=True, check=True)
+        found = {line.split()[-1].removeprefix("_") for line in table.stdout.splitlines()}
+        assert found == {f"{identifier}_fmi2{function}" for function in FMI_FUNCTIONS}
+    program = tmp_path / "main.c"
+    declared = "".join(f"const char *{identifier}_fmi2GetVersion(void);\n" for identifier in identifiers)
+    printed = "".join(f"puts({identifier}_fmi2GetVersion());" for identifier in identifiers)
+    program.write_text(f"#include <stdio.h>\n{declared}int main(void) {{ {printed} return 0; }}\n")
+    subprocess.run(["cc", program, *objects, "-lm", "-o", tmp_path / "main"], check=True)
+    done = subprocess.run([tmp_path / "main"], capture_output=True, text=True, check=True)
+    assert done.stdout.split() == ["2.0"] * len(names)
+
+
+@pytest.mark.skipif(not shutil.which("cc"), reason="needs the system's C compiler")
+@pytest.mark.parametrize(
+    ("defined", "expected"),
+    [
+        (["FMI2_OVERRIDE_FUNCTION_PREFIX=other_", "FMI2_FUNCTION_PREFIX=lee2012_"], "other_fmi2DoStep"),
+        ([], "fmi2DoStep"),
+    ],
+)
+def test_an_overriding_prefix_goes_before_and_without_one_the_names_are_plain(
+    defined: list[str], expected: str, tmp_path: Path
+) -> None:
+    command = ["cc", "-std=c99", *(f"-D{macro}" for macro in defined), "-c", "fmu.c"]
+    subprocess.run(command, cwd=written("lee2012", tmp_path), check=True)
+    table = subprocess.run(["nm", "-g", "--defined-only", "fmu.o"], cwd=tmp_path, capture_output=True, text=True)
+    assert expected in {line.split()[-1].removeprefix("_") for line in table.stdout.splitlines() if "DoStep" in line}
 
 
 @pytest.mark.skipif(sys.platform != "linux" or not shutil.which("cc"), reason="reads symbols with objdump")
@@ -115,8 +165,7 @@ def test_all_globals_are_constants_and_memory_is_asked_for_with_instances_and_st
     name: str, tmp_path: Path
 ) -> None:
     """Unoptimised, so that each function calls what its text says."""
-    for file, content in sources(BLOCKS[name]).items():
-        (tmp_path / file).write_bytes(content)
+    written(name, tmp_path)
     subprocess.run(["cc", "-std=c99", "-O0", "-fPIC", "-c", "fmu.c"], cwd=tmp_path, check=True)
     table = subprocess.run(["objdump", "-t", "fmu.o"], cwd=tmp_path, capture_output=True, text=True, check=True).stdout
     data = {line.split()[-3] for line in table.splitlines() if " O " in line}
@@ -124,7 +173,9 @@ def test_all_globals_are_constants_and_memory_is_asked_for_with_instances_and_st
     code = subprocess.run(["objdump", "-dr", "fmu.o"], cwd=tmp_path, capture_output=True, text=True, check=True).stdout
     functions = {part.split(">:")[0].split("<")[-1]: part for part in code.split("\n\n") if ">:" in part}
     allocating = {name for name, text in functions.items() if re.search(r"\b(malloc|calloc|realloc)\b", text)}
-    assert allocating == {"fmi2Instantiate", "fmi2GetFMUstate", "fmi2DeSerializeFMUstate"}
+    assert allocating == {"fmi2Instantiate", "room_for"}
+    states = {name for name, text in functions.items() if "<room_for>" in text.partition("\n")[2]}
+    assert states - {"room_for"} == {"fmi2GetFMUstate", "fmi2DeSerializeFMUstate"}
 
 
 @pytest.mark.skipif(sys.platform != "linux" or not shutil.which("nm"), reason="reads symbols with nm")

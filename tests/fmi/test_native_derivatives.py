@@ -10,7 +10,8 @@ import pytest
 from imufmu.blocks.block import SampledBlock
 from imufmu.fmi.native import block_called
 from imufmu.registry import BLOCKS
-from support.native_fmus import derivative, enter, leave, native, refusal
+from support.fmu import refusal
+from support.native_fmus import derivative, enter, leave, native
 
 WITH_INPUTS = [*(name for name, block in BLOCKS.items() if block.inputs), "imu+lee2012"]
 # Of plumb, the sixth sample takes a slow step and the seventh starts from what that has changed.

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
 import fmpy
+import pytest
 from fmpy import fmi2
+from fmpy.fmi1 import FMICallException
 
 from imufmu.cosim.slave import forget_paths
 from imufmu.fmi.build import cached_fmu
@@ -16,6 +18,8 @@ from imufmu.fmi.native import cached_native_fmu
 from support.places import built_once
 
 KINDS = ("python", "native")
+OK, WARNING, ERROR, FATAL = 0, 1, 3, 4
+REFUSED = {"python": FATAL, "native": ERROR}  # PythonFMU has no other word for it
 
 
 def path(name: str, kind: str = "python") -> Path:
@@ -48,6 +52,7 @@ class Fmu:
         guid: str = "",
         logging: bool = True,
     ) -> None:
+        self.kind = kind
         self.model = description(name, kind)
         self.variables = {v.name: v for v in self.model.modelVariables}
         self.log: list[tuple[int, str]] = []
@@ -118,3 +123,18 @@ def restore(fmu: Fmu, saved: bytes) -> None:
     state = fmu.slave.deSerializeFMUstate(saved)
     fmu.slave.setFMUstate(state)
     fmu.slave.freeFMUstate(state)
+
+
+def refusal(instance: Fmu, call: Callable[[], Any]) -> str:
+    """The one message of a call that is to be refused. A Python FMU is brought back to where it was before."""
+    before, saved = len(instance.log), serialised(instance)
+    with pytest.raises(FMICallException) as raised:
+        call()
+    assert raised.value.status == REFUSED[instance.kind]
+    (message,) = (text for status, text in instance.log[before:] if status == ERROR)
+    if instance.kind == "python":
+        status, text = instance.log.pop()  # PythonFMU's wrapper says so too, in other words
+        assert status == FATAL and text.startswith("Fatal py exception encountered")
+        restore(instance, saved)
+    assert [status for status, _ in instance.log[before:]] == [ERROR]
+    return message

@@ -70,10 +70,10 @@ class Instance:
     def _check_step(self, t: float, h: float, period: float) -> None:
         if not (math.isfinite(t) and math.isfinite(h) and h > 0):
             raise StepError(
-                f"{self.block.name}: cannot step from t = {t} s by h = {h} s; h must be positive and finite"
+                f"{self.block.name}: cannot step from t = {t:.15g} s by h = {h:.15g} s; h must be positive and finite"
             )
         if h / period > LONGEST_STEP:
-            raise StepError(f"{self.block.name}: a step of h = {h} s is more than {LONGEST_STEP} internal steps")
+            raise StepError(f"{self.block.name}: a step of h = {h:.15g} s is more than {LONGEST_STEP:g} internal steps")
 
     def get_state(self) -> dict[str, Any]:
         """Everything that determines the future, as JSON-able values; floats survive bit for bit."""
@@ -141,7 +141,7 @@ class SampledInstance(Instance):
         self._check_step(t, h, self.sample_period)
         end = (t + h - self.start_time) / self.sample_period - CLOCK_TOLERANCE
         if not abs(end - self.next_sample) <= LONGEST_STEP:
-            raise StepError(f"{self.block.name}: t = {t} s lies more than {LONGEST_STEP} samples away")
+            raise StepError(f"{self.block.name}: t = {t:.15g} s lies more than {LONGEST_STEP:g} samples away")
         before = self.get_state() if self.block.has_solver else None
         for _ in range(self.next_sample, math.ceil(end)):
             self.sample()
@@ -231,13 +231,14 @@ def solver_steps(h: float, max_step: float) -> int:
 
 def diverged(block: Block, t: float, max_step: float) -> str:
     """Message for a solution that is not finite any more at t (s)."""
-    return f"{block.name}: not finite at t = {t} s; the solver needs a max_step below {max_step:g} s, or calmer inputs"
+    needs = f"the solver needs a max_step below {max_step:g} s, or calmer inputs"
+    return f"{block.name}: not finite at t = {t:.15g} s; {needs}"
 
 
 def chain_diverged(block: Block, t: float, sample_period: float) -> str:
     """Message for a series whose plant's solution is not finite any more at t (s)."""
     needs = f"its plant needs a sample_period below {sample_period:g} s, or calmer inputs"
-    return f"{block.name}: not finite at t = {t} s; {needs}"
+    return f"{block.name}: not finite at t = {t:.15g} s; {needs}"
 
 
 def instantiate(block: Block) -> SampledInstance | ContinuousInstance:

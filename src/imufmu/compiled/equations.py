@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import Any
 
 import casadi as ca
@@ -69,8 +70,14 @@ def output_derivative(block: Block, function: Any) -> Any:
 
 
 def equations(block: Block, functions: dict[str, Any]) -> str:
-    """C of these Functions, each with the prefix of the block's name."""
+    """C of these Functions, each with the prefix of the block's name. Every name is static.
+
+    CasADi defines its own helpers as global functions. What was declared static before stays static.
+    """
     generator = ca.CodeGenerator("equations", _STYLE | {"prefix": f"{block.name}_"})
     for function in functions.values():
         generator.add(function)
-    return str(generator.dump())
+    text = str(generator.dump())
+    helpers = re.findall(r"^(casadi_real|casadi_int|void) casadi_(\w+)(\(.*\)) \{", text, re.MULTILINE)
+    static = "".join(f"static {kind} {block.name}__{name}{arguments};\n" for kind, name, arguments in helpers)
+    return f"#define casadi_real double\n#define casadi_int int\n{static}\n{text}"

@@ -24,6 +24,7 @@ from fmpy.logging import addLoggerProxy
 
 _LATEST = 3  # messages quoted with an error
 _MOST_WARNINGS = 50  # different warnings kept of one instance
+_ADDED = "Fatal py exception encountered"  # by PythonFMU, to what its slave has said of the same call
 _environments = count(1)
 _listening: dict[int, Messages] = {}
 
@@ -51,6 +52,8 @@ class Messages:
 
     def add(self, status: int, text: str) -> None:
         """Keep a message with its fmi2Status."""
+        if self._complaints and text.startswith(_ADDED):
+            return
         (self._remarks if status == fmi2OK else self._complaints).append(text)
         if status != fmi2OK and len(self._warnings) < _MOST_WARNINGS:
             self._warnings[text] = None

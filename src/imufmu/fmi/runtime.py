@@ -13,7 +13,7 @@ from pathlib import Path
 
 PACKAGE = Path(__file__).parents[1]
 
-_MODULES = ("__init__", "fmi/__init__", "fmi/slave", "fmi/runtime")
+_MODULES = ("__init__", "fmi/__init__", "fmi/slave", "fmi/component", "fmi/runtime", "fmi/saved_state", "fmi/wrapper")
 _FOLDERS = ("blocks", "estimators", "plants", "sensors")
 
 
@@ -42,7 +42,7 @@ def fingerprint(package: Path) -> str:
 
 
 # Now, because a package that was loaded from an unpacked FMU is deleted together with it, and goes on serving others.
-_IN_MEMORY = fingerprint(PACKAGE)
+IN_MEMORY = fingerprint(PACKAGE)
 
 
 def rejoin_installed() -> None:
@@ -54,7 +54,7 @@ def rejoin_installed() -> None:
         return
     for entry in sys.path:
         installed = Path(entry) / "imufmu"
-        if (installed / "cosim").is_dir() and fingerprint(installed) == _IN_MEMORY:
+        if (installed / "cosim").is_dir() and fingerprint(installed) == IN_MEMORY:
             for name, module in list(sys.modules.items()):
                 folder = str(installed.joinpath(*name.split(".")[1:]))
                 if name.split(".")[0] == "imufmu" and folder not in getattr(module, "__path__", [folder]):
@@ -67,7 +67,7 @@ def refusal(resources: Path) -> str:
     own = resources / "imufmu"
     if not own.is_dir():
         return f"{resources} holds no copy of imufmu: the FMU is incomplete, build it again"
-    if fingerprint(own) == _IN_MEMORY:
+    if fingerprint(own) == IN_MEMORY:
         return ""
     return (
         f"this FMU was built from another version of imufmu than the one already in memory ({PACKAGE}). "

@@ -1,201 +1,187 @@
-"""PythonFMU adapter: a block as an FMI 2.0 co-simulation slave.
+"""PythonFMU adapter: a block as an FMI 2.0 co-simulation slave. What it answers stands in ``component``.
 
-PythonFMU turns every exception that leaves a slave into fmi2Fatal, so none does, with two exceptions that FMI has no
-other way to say: an FMU that cannot start at all (the constructor) and parameters out of bounds (the end of
-initialisation). Everything else is logged, answered with a defined value, and leaves the state as it was.
+PythonFMU knows two answers only: fmi2OK, and for an exception fmi2Fatal, which is therefore its word for every refusal.
+Nothing but a refusal leaves a slave. What a host with logging off must know is printed to stderr, once.
+
+This module loads without NumPy and CasADi: a host's interpreter that lacks them is told so by fmi2Instantiate. The
+wrapper survives an exception there, but not in the import of an FMU's script.
 """
 
 from __future__ import annotations
 
-import ctypes
-import math
+import importlib
 import sys
+import weakref
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any, ClassVar, NoReturn
 from xml.etree.ElementTree import Element
 
 from pythonfmu import Fmi2Slave
 from pythonfmu.enums import Fmi2Status
 
-from ..blocks.block import Block, ParameterError, Variable
-from ..blocks.instance import SampledInstance, StepError, instantiate
-from ..blocks.signals import Parameter
+from . import saved_state
 from .runtime import refusal, rejoin_installed
+from .wrapper import Log, hold, let_go_at_the_end
 
-_STARTING, _INITIALISING, _STEPPING = range(3)
 
+class Refused(Exception):
+    """Leaves the slave where a call is refused; the wrapper logs its ``repr``, as a C format."""
 
-def _hold(thing: Any) -> None:
-    """Add a reference that is never given back.
-
-    PythonFMU 0.7.0 releases some objects once more than it acquired them: the namespace of the FMU's script when it
-    looks up the class in it, after an exception the slave, its class and its log. Without a reference to spare they are
-    freed, and the next call crashes the host.
-    """
-    ctypes.pythonapi.Py_IncRef(ctypes.py_object(thing))
+    def __repr__(self) -> str:
+        return str(self).replace("%", "%%")
 
 
 class BlockSlave(Fmi2Slave):
-    """Base of every slave: a subclass names its ``block``. Value references count the block's variables from 0;
-    the one after the last is ``sample_time`` of a sampled block."""
+    """Base of every slave: a subclass says ``where`` its block is declared, as in imufmu.estimators.lee2012:BLOCK."""
 
-    block: ClassVar[Block]
+    where: ClassVar[str]
+    _living: ClassVar[weakref.WeakSet[BlockSlave]]
 
     def __init_subclass__(cls) -> None:
-        _hold(vars(sys.modules[cls.__module__]))
+        hold(vars(sys.modules[cls.__module__]))
+        cls._living = weakref.WeakSet()
 
     def __init__(self, **kwargs: Any) -> None:
         super().__init__(**kwargs)
+        logger = kwargs.get("logger", 0)
+        self._log = Log(logger, self.instance_name)
+        self._explained = False
+        self.modelName = _model_name(type(self))
+        try:
+            if logger:  # else it is the builder, which takes its own path off again
+                _forget(kwargs["resources"])
+            self._start(Path(kwargs["resources"]))
+        except Exception as error:  # whatever is missing in this interpreter or wrong in edited sources
+            reason = str(error) if isinstance(error, Refused) else f"{self.modelName}: {_described(error)}"
+            self._explain(reason)
+            raise Refused(reason) from error
+        finally:
+            let_go_at_the_end(logger)  # last, when CasADi is loaded: Python has to go before it
+        self._living.add(self)
+
+    def _start(self, resources: Path) -> None:
         rejoin_installed()
-        reason = refusal(Path(kwargs["resources"]))
+        reason = refusal(resources)
         if reason:
-            raise RuntimeError(f"{self.block.name}: {reason}")
-        self.modelName = self.block.name
-        self._instance = instantiate(self.block)
-        self._sampled = isinstance(self._instance, SampledInstance)
-        self._values = self._instance.values
-        self._inputs = len(self._instance.u)
-        self._start_time = 0.0
-        self._phase = _STARTING
-        self._stale = True  # the outputs do not yet reflect the inputs and parameters in force
-        self._missing = False  # in an episode of inputs that are not finite
+            raise Refused(f"{self.modelName}: {reason}")
+        try:
+            module, name = self.where.split(":")
+            self.block = getattr(importlib.import_module(module), name)
+            from .component import Component, Refusal
+        except ImportError as error:
+            needs = "it needs NumPy and CasADi in the Python interpreter of this host"
+            raise Refused(f"{self.modelName}: {error}; {needs} ({sys.prefix})") from error
+        self._component = Component(self.block, self._warn)
+        self._refusal = Refusal
 
     def to_xml(self, model_options: Any = None) -> Element:
         from .model_description import model_description  # needed where FMUs are built, not where they run
 
         return model_description(self.block)
 
+    # Messages
+
     def log(self, msg: str, status: Fmi2Status = Fmi2Status.ok, category: Any = None, debug: Any = None) -> None:
         """Log a message. PythonFMU hands it on as a C format, where a percent sign would be read as a directive."""
-        super().log(msg.replace("%", "%%"), status, category)
+        own = category or f"logStatus{status.name.capitalize()}"
+        super().log(msg.replace("%", "%%"), status, self._log.category(own))
 
-    # Phases
+    def _warn(self, message: str) -> None:
+        self.log(message, Fmi2Status.warning)
+
+    def _explain(self, message: str) -> None:
+        """Print the first message that a host with logging off will not get."""
+        if not self._log.is_on and not self._explained and sys.stderr:
+            self._explained = True
+            print(message, file=sys.stderr, flush=True)
+
+    # Every call of the host
+
+    def _answer(self, function: Callable[..., Any], *arguments: Any) -> Any:
+        try:
+            return function(*arguments)
+        except BaseException as error:  # Ctrl-C too: no other exception may leave the slave
+            is_refusal = isinstance(error, self._refusal)
+            self._refuse(str(error) if is_refusal else f"{self.block.name}: {_described(error)}")
+
+    def _refuse(self, message: str) -> NoReturn:
+        self._component.failed()
+        self.log(message, Fmi2Status.error)
+        self._explain(message)
+        hold(self, type(self), self.log_queue)
+        raise Refused(message)
 
     def setup_experiment(self, start_time: float, stop_time: Any = None, tolerance: Any = None) -> None:
-        self._start_time = start_time
+        self._answer(self._component.setup_experiment, start_time)
 
     def enter_initialization_mode(self) -> None:
-        self._phase = _INITIALISING
-        self._stale = True
+        self._answer(self._component.enter_initialization_mode)
 
     def exit_initialization_mode(self) -> None:
-        try:
-            self._instance.initialise(self._start_time)
-        except ParameterError as error:
-            self.log(str(error), Fmi2Status.error)
-            for thing in (self, type(self), self.log_queue):
-                _hold(thing)
-            raise
-        self._phase = _STEPPING
-        self._stale = False
+        self._answer(self._component.exit_initialization_mode)
 
     def do_step(self, current_time: float, step_size: float) -> bool:
-        if self._phase != _STEPPING:
-            self.log(f"{self.block.name}: doStep before a successful initialisation", Fmi2Status.error)
-            return False
-        self._report_missing_inputs()
-        try:
-            self._instance.do_step(current_time, step_size)
-        except StepError as error:
-            self.log(str(error), Fmi2Status.error)
-            return False
-        self._stale = False
+        self._answer(self._component.do_step, current_time, step_size)
         return True
 
-    def _report_missing_inputs(self) -> None:
-        """Log once per episode which inputs are not finite."""
-        names = []
-        if not math.isfinite(sum(self._instance.u.tolist())):  # one sum is cheaper than many questions
-            names = [v.name for v in self.block.variables[: self._inputs] if not math.isfinite(self._values[v.index])]
-        if names and not self._missing:
-            self.log(f"{self.block.name}: not finite, treated as missing: {', '.join(names)}", Fmi2Status.warning)
-        self._missing = bool(names)
+    def terminate(self) -> None:
+        self._answer(self._component.terminate)
 
-    def _refresh(self) -> None:
-        """Bring the outputs up to date with what was set."""
-        self._stale = False
-        if self._phase == _STEPPING:
-            self._instance.refresh()
-        elif not self.block.parameter_problems(self._instance.p):
-            self._instance.initialise(self._start_time)
-
-    # Variables
-
-    def _get(self, references: Sequence[int], convert: Callable[[float], Any]) -> list[Any]:
-        if self._stale:
-            self._refresh()
-        known = len(self._values)
-        if max(references, default=0) < known:
-            values = self._values[references].tolist()
-        else:
-            values = [self._values[r].item() if r < known else self._sample_time(r) for r in references]
-        return values if convert is float else [convert(value) for value in values]
-
-    def _sample_time(self, reference: int) -> float:
-        if isinstance(self._instance, SampledInstance) and reference == len(self._values):
-            return self._instance.sample_time
-        self.log(f"{self.block.name}: no variable has value reference {reference}", Fmi2Status.error)
-        return 0.0
-
-    def _set(self, references: Sequence[int], values: Sequence[float]) -> None:
-        self._stale = True
-        if max(references, default=0) < self._inputs:
-            self._values[references] = values
-            return
-        for reference, value in zip(references, values, strict=True):
-            refused = self._why_not_settable(reference, value)
-            if refused:
-                self.log(f"{self.block.name}: {refused}", Fmi2Status.error)
-            else:
-                self._values[reference] = value
-
-    def _why_not_settable(self, reference: int, value: float) -> str:
-        variables: Sequence[Variable] = self.block.variables
-        if reference >= len(variables):
-            return f"the variable with value reference {reference} cannot be set"
-        variable = variables[reference]
-        if variable.group in ("output", "local"):
-            return f"{variable.name} is an {variable.group} variable and cannot be set"
-        declared = variable.signal
-        if self._phase == _STEPPING and isinstance(declared, Parameter):
-            if not declared.tunable:
-                return f"{variable.name} is fixed once the simulation runs; it keeps {self._values[reference]:g}"
-            if not declared.minimum <= value <= declared.maximum:
-                return (
-                    f"{variable.name} = {value:g} is outside [{declared.minimum:g}, {declared.maximum:g}]; "
-                    f"it keeps {self._values[reference]:g}"
-                )
-        return ""
-
-    def get_real(self, vrs: Sequence[int]) -> list[float]:
-        return self._get(vrs, float)
+    def get_real(self, vrs: Sequence[int]) -> Any:
+        return self._answer(self._component.get, "Real", vrs)
 
     def get_integer(self, vrs: Sequence[int]) -> list[int]:
-        return self._get(vrs, int)
+        return [int(value) for value in self._answer(self._component.get, "Integer", vrs)]
 
     def get_boolean(self, vrs: Sequence[int]) -> list[bool]:
-        return self._get(vrs, bool)
+        return [bool(value) for value in self._answer(self._component.get, "Boolean", vrs)]
+
+    def get_string(self, vrs: Sequence[int]) -> Any:
+        return self._answer(self._component.strings, "fmi2GetString", vrs)
 
     def set_real(self, vrs: Sequence[int], values: Sequence[float]) -> None:
-        self._set(vrs, values)
+        self._answer(self._component.set, "Real", vrs, values)
 
     def set_integer(self, vrs: Sequence[int], values: Sequence[int]) -> None:
-        self._set(vrs, values)
+        self._answer(self._component.set, "Integer", vrs, values)
 
     def set_boolean(self, vrs: Sequence[int], values: Sequence[bool]) -> None:
-        self._set(vrs, values)
+        self._answer(self._component.set, "Boolean", vrs, values)
 
-    # Whole state
+    def set_string(self, vrs: Sequence[int], values: Sequence[str]) -> None:
+        self._answer(self._component.strings, "fmi2SetString", vrs)
 
-    def _get_fmu_state(self) -> dict[str, Any]:
-        own = {"phase": self._phase, "stale": self._stale, "missing": self._missing, "setup": self._start_time}
-        return {"block": self.block.name, "instance": self._instance.get_state(), **own}
+    def _get_fmu_state(self) -> Any:
+        return self._answer(self._component.get_state)
 
-    def _set_fmu_state(self, state: dict[str, Any]) -> None:
-        if state.get("block") != self.block.name:
-            self.log(f"{self.block.name}: the state is that of another FMU and was not set", Fmi2Status.error)
-            return
-        self._instance.set_state(state["instance"])
-        self._phase, self._stale = state["phase"], state["stale"]
-        self._missing, self._start_time = state["missing"], state["setup"]
+    def _set_fmu_state(self, state: Any) -> None:
+        self._answer(self._component.set_state, state)
+
+    _fmu_state_to_bytes = staticmethod(saved_state.to_bytes)
+
+    @classmethod
+    def _fmu_state_from_bytes(cls, state: bytes) -> Any:
+        """The wrapper asks the class, and gives back references of an instance that it does not name."""
+        try:
+            return saved_state.from_bytes(state)
+        except BaseException as error:
+            hold(cls)
+            for living in cls._living:
+                hold(living, living.log_queue)
+            is_known = isinstance(error, saved_state.DamagedState)
+            raise Refused(f"{_model_name(cls)}: {error if is_known else _described(error)}") from error
+
+
+def _model_name(cls: type) -> str:
+    """Name of the FMU, which that of its script holds."""
+    return cls.__module__.removesuffix("_fmu")
+
+
+def _forget(resources: str) -> None:
+    """Take the FMU's folder off the path again. The wrapper adds it at every start; what is in it is loaded by now."""
+    sys.path[:] = [entry for entry in sys.path if entry != resources]
+
+
+def _described(error: BaseException) -> str:
+    return f"{type(error).__name__}: {error}"
