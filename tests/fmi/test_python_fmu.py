@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+import math
 import shutil
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
+from fmpy.fmi1 import FMICallException
 
 from imufmu.fmi import runtime
 from imufmu.fmi.build import cached_fmu
+from imufmu.fmi.component import Component
 from support import fmu
 
 
@@ -66,4 +71,88 @@ def test_a_percent_sign_in_a_message_arrives_as_it_is():
     slave = sys.modules["lee2012_fmu"].Lee2012(instance_name="i", resources=f"{fmu.unpacked('lee2012')}/resources")
     slave.log("5% of %s")
     assert slave.log_queue[-1].msg % () == "5% of %s"
+    instance.slave.freeInstance()
+
+
+WRONG: dict[str, Callable[[fmu.Fmu], Any]] = {
+    "setupExperiment": lambda i: i.slave.setupExperiment(startTime=math.nan),
+    "enterInitializationMode": lambda i: i.slave.enterInitializationMode(),
+    "exitInitializationMode": lambda i: i.slave.exitInitializationMode(),
+    "doStep": lambda i: i.step(0.0, -1.0),
+    "getReal": lambda i: i.slave.getReal([2**31]),
+    "getInteger": lambda i: i.slave.getInteger([2**32 - 1]),
+    "getBoolean": lambda i: i.slave.getBoolean([0]),
+    "getString": lambda i: i.slave.getString([7]),
+    "setReal": lambda i: i.slave.setReal([2**31], [1.0]),
+    "setInteger": lambda i: i.slave.setInteger([2**31], [1]),
+    "setBoolean": lambda i: i.slave.setBoolean([2**31], [True]),
+    "setString": lambda i: i.slave.setString([2**31], ["a"]),
+    "deSerializeFMUstate": lambda i: i.slave.deSerializeFMUstate(b"\0garbage" * 30),
+}
+
+
+@pytest.mark.parametrize("function", WRONG)
+def test_an_error_in_any_function_is_survived_by_it_by_free_and_by_other_instances(function: str) -> None:
+    """The wrapper releases too much then; 100 times show it."""
+    other = fmu.Fmu("lee2012", "other").initialise()
+    for _ in range(100):
+        instance = fmu.Fmu("lee2012").initialise()
+        for _ in range(2):
+            with pytest.raises(FMICallException) as raised:
+                WRONG[function](instance)
+            assert raised.value.status == fmu.FATAL
+        instance.slave.freeInstance()
+    other.step(0.0, 0.01)
+    other.close()
+
+
+def test_after_an_error_it_can_be_read_and_goes_on_from_a_saved_state_or_after_a_reset_only() -> None:
+    """PythonFMU calls the error fatal, after which FMI lets nothing go on as if it were well."""
+    instance = fmu.Fmu("lee2012").initialise()
+    instance.set({"gyro[1]": 0.3})
+    instance.step(0.0, 0.05)
+    before = instance.reals()
+    for _ in range(2):
+        with pytest.raises(FMICallException):
+            instance.step(0.05, -1.0)
+        assert instance.reals() == before
+        for call in (lambda: instance.step(0.05, 0.01), lambda: instance.set({"gyro[1]": 0.0})):
+            with pytest.raises(FMICallException):
+                call()
+            assert "after an error; reset the FMU or restore a saved state" in instance.log[-2][1]
+        fmu.restore(instance, fmu.serialised(instance))
+        instance.step(0.05, 1e-9)
+    with pytest.raises(FMICallException):
+        instance.step(0.05, -1.0)
+    instance.slave.reset()
+    instance.initialise().step(0.0, 0.01)
+    instance.close()
+
+
+@pytest.mark.parametrize("error", [ZeroDivisionError("by nothing"), KeyboardInterrupt("Ctrl-C")])
+def test_any_other_error_is_told_and_leaves_the_host_alive(
+    error: BaseException, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(*_: float) -> None:
+        raise error
+
+    instance = fmu.Fmu("lee2012").initialise()
+    monkeypatch.setattr(Component, "do_step", fail)
+    with pytest.raises(FMICallException):
+        instance.step(0.0, 0.01)
+    assert instance.log[-2] == (fmu.ERROR, f"lee2012: {type(error).__name__}: {error}")
+    instance.slave.freeInstance()
+
+
+@pytest.mark.parametrize("categories", [[], ["logAll"], ["logStatusError"], ["logStatusWarning", "logAll"]])
+def test_categories_are_those_that_the_host_asked_for_and_all_is_all(categories: list[str]) -> None:
+    instance = fmu.Fmu("lee2012").initialise()
+    instance.slave.setDebugLogging(True, categories)
+    instance.set({"gyro[1]": math.nan})
+    instance.step(0.0, 0.01)
+    with pytest.raises(FMICallException):
+        instance.step(0.01, -1.0)
+    warned = [text for status, text in instance.log if status == fmu.WARNING]
+    refused = [text for status, text in instance.log if status == fmu.ERROR]
+    assert len(warned) == (categories != ["logStatusError"]) and len(refused) == 1
     instance.slave.freeInstance()

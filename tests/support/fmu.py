@@ -12,7 +12,6 @@ import pytest
 from fmpy import fmi2
 from fmpy.fmi1 import FMICallException
 
-from imufmu.cosim.slave import forget_paths
 from imufmu.fmi.build import cached_fmu
 from imufmu.fmi.native import cached_native_fmu
 from support.places import built_once
@@ -67,10 +66,7 @@ class Fmu:
         callbacks.allocateMemory = fmi2.fmi2CallbackAllocateMemoryTYPE(fmi2.calloc)
         callbacks.freeMemory = fmi2.fmi2CallbackFreeMemoryTYPE(fmi2.free)
         self.callbacks = callbacks
-        try:
-            self.slave.instantiate(callbacks=callbacks, loggingOn=logging)
-        finally:
-            forget_paths(Path(folder or unpacked(name, kind)))  # a process started later would import from there
+        self.slave.instantiate(callbacks=callbacks, loggingOn=logging)
 
     def _logged(self, _environment: Any, _name: bytes, status: int, _category: bytes, message: bytes) -> None:
         self.log.append((status, message.decode()))
