@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -51,3 +52,14 @@ def test_a_packed_system_gives_the_same_result(tmp_path: Path) -> None:
     original, result = simulate("pendulum_lee2012", stop_time=1.0), simulate(packed, stop_time=1.0)
     assert result.names == original.names
     assert all(result[name].tolist() == original[name].tolist() for name in original.names)
+
+
+def test_steps_and_sample_periods_of_whole_rates_are_written_to_the_last_digit() -> None:
+    """So that every host counts the same steps, whether it rounds, adds up or divides."""
+    written = []
+    for path in [*models_folder().rglob("*.ssd"), *models_folder().rglob("*.ssv")]:
+        text = path.read_text(encoding="utf-8")
+        found = re.findall(r'stepSize="([^"]+)"|name="sample_period"[^/]*?value="([^"]+)"', text)
+        written += [(path.name, float(step or period)) for step, period in found]
+    assert {value for _, value in written} >= {0.01, 0.005, 1 / 120}
+    assert [(name, value) for name, value in written if value != 1 / round(1 / value)] == []

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import re
 import subprocess
 import sys
@@ -15,7 +16,7 @@ from lxml import etree
 from imufmu.blocks.block import SampledBlock
 from imufmu.blocks.signals import UNITS
 from imufmu.fmi.build import BuildError, build_fmu, cached_fmu
-from imufmu.fmi.model_description import guid
+from imufmu.fmi.model_description import guid, model_description
 from imufmu.registry import BLOCKS
 from support import fmu
 
@@ -88,6 +89,33 @@ def test_dependencies_are_those_that_changing_each_input_shows(name):
             moved = {o for o, a, b in zip(outputs, before, instance.get(*outputs), strict=True) if a != b}
             assert moved <= {o for o in outputs if changed in declared[o]}, (kind, changed)
             instance.set({changed: old})
+
+
+@pytest.mark.parametrize("kind", fmu.KINDS)
+@pytest.mark.parametrize("name", NAMES)
+def test_outputs_of_sampled_blocks_declare_no_feed_through_and_native_ones_say_what_their_derivative_is_of(
+    name: str, kind: str
+) -> None:
+    """Their outputs are held, which test_fmu_contract.py shows; a derivative that is not zero needs a word then."""
+    with zipfile.ZipFile(fmu.path(name, kind)) as archive:
+        root = etree.fromstring(archive.read("modelDescription.xml"))
+        page = archive.read("documentation/index.html").decode()
+    sampled = isinstance(BLOCKS[name], SampledBlock)
+    dependencies = [unknown.get("dependencies") for unknown in root.iterfind("ModelStructure/Outputs/Unknown")]
+    assert None not in dependencies  # nothing said would mean: on everything
+    assert not sampled or set(dependencies) == {""}
+    told = root.findtext("VendorAnnotations/Tool[@name='imufmu']/DirectionalDerivative", "")
+    assert ("no feed-through" in told and "of the last sample" in told) == (sampled and kind == "native")
+    assert ("no feed-through" in " ".join(page.split())) == (sampled and kind == "native")
+
+
+@pytest.mark.parametrize("rate", [100, 120, 285, 3, 7, 1.0 / 3])
+def test_the_default_step_is_written_so_that_it_reads_back_as_the_same_double(rate: float) -> None:
+    """Nine digits of 1/120 s take 721 steps to 6 s, or 720, by how a host rounds."""
+    block = dataclasses.replace(BLOCKS["lee2012"], period=1.0 / rate)
+    experiment = model_description(block).find("DefaultExperiment")
+    assert experiment is not None and float(experiment.get("stepSize", "")) == 1.0 / rate
+    assert float(experiment.get("tolerance", "")) > 0
 
 
 def test_outputs_of_sampled_blocks_are_discrete_and_those_of_plants_continuous():

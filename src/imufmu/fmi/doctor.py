@@ -40,6 +40,8 @@ _HOSTS = {
     "OMSimulator": _DESKTOPS,
     "FMPy": frozenset(_PLATFORMS),
 }
+# PythonFMU decodes no other character of the address that a host gives it, and crashes the host where that fails.
+_PLAIN_PATH = "unpack it to a path of ASCII letters, digits, blanks and -._~ only: others crash the host"
 
 
 class Level(Enum):
@@ -158,7 +160,7 @@ def _python_packages(path: Path) -> Finding:
     text = f"needs Python in the host process, with {', '.join(outside) or 'no further package'}"
     if missing:
         return Finding(Level.PROBLEM, "Python", f"{text}; not installed here: {', '.join(missing)}")
-    return Finding(Level.NOTE, "Python", f"{text} (all installed here)")
+    return Finding(Level.NOTE, "Python", f"{text} (all installed here); {_PLAIN_PATH}")
 
 
 def _hosts(platforms: list[str], model: Any, is_python: bool) -> Iterator[Finding]:

@@ -22,6 +22,14 @@ _NAMESPACE = uuid.UUID("7b0c9d52-4a0e-5c8e-9a53-3f6d8f0f7c11")  # of imufmu's GU
 _STOP_TIME = 10.0
 NATIVE_SOURCE = "fmu.c"  # includes all others
 _PLANT_STEP = 0.01
+_TOLERANCE = 1e-6  # for hosts with a solver of their own, some of which warn without one; the FMUs have fixed steps
+
+# Of what fmi2GetDirectionalDerivative of a sampled block is the derivative, for those who write importers.
+DERIVATIVE_OF_SAMPLED = (
+    "Outputs are held between samples. At a communication point no output depends on the inputs in force, so none is "
+    "declared to: there is no feed-through. fmi2GetDirectionalDerivative answers another question: how the outputs of "
+    "the last sample would have changed with the inputs of that sample. During initialisation that is the first sample."
+)
 
 LOG_CATEGORIES = {
     "logStatusWarning": "Missing inputs",
@@ -94,7 +102,11 @@ def _description(block: Block, identity: str, native: bool) -> Element:
     for name, description in LOG_CATEGORIES.items():
         SubElement(categories, "Category", name=name, description=description)
     step = block.period if isinstance(block, SampledBlock) else _PLANT_STEP
-    SubElement(root, "DefaultExperiment", startTime="0", stopTime=f"{_STOP_TIME:g}", stepSize=f"{step:g}")
+    times = {"startTime": "0", "stopTime": f"{_STOP_TIME:g}", "stepSize": _number(step)}
+    SubElement(root, "DefaultExperiment", times, tolerance=_number(_TOLERANCE))
+    if native and isinstance(block, SampledBlock):
+        tool = SubElement(SubElement(root, "VendorAnnotations"), "Tool", name="imufmu")
+        SubElement(tool, "DirectionalDerivative").text = DERIVATIVE_OF_SAMPLED
     variables = SubElement(root, "ModelVariables")
     for reference, variable in listed:
         _scalar_variable(variables, block, reference, variable)
