@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -34,7 +35,7 @@ __attribute__((destructor)) static void use_memory(void) {
 @pytest.fixture(scope="module")
 def amplifier(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A library by which a use of freed memory at the end of a process kills it."""
-    if sys.platform != "linux" or subprocess.run(["which", "cc"], capture_output=True).returncode:
+    if sys.platform != "linux" or not shutil.which("cc"):
         pytest.skip("needs Linux and a C compiler")
     source = tmp_path_factory.mktemp("amplifier") / "amplifier.c"
     source.write_text(AMPLIFIER)

@@ -129,11 +129,8 @@ class Component:
                 self._find(reference, kind)
         if self._stale:
             self._refresh()
-        known = len(self._values)
-        if max(references, default=0) < known:
-            values: list[float] = self._values[references].tolist()
-            return values
-        return [self._values[r].item() if r < known else self._sample_time(r) for r in references]
+        known, item = len(self._values), self._values.item
+        return [item(r) if r < known else self._sample_time(r) for r in references]
 
     def _sample_time(self, reference: int) -> float:
         """The clock of a sampled block, whose value reference follows the last variable's."""
