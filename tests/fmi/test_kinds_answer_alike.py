@@ -59,6 +59,14 @@ def set_as_boolean(name: str) -> Call:
     return lambda i: i.slave.setBoolean(reference(i, name), [True])
 
 
+def set_integers(i: fmu.Fmu) -> Any:
+    return i.slave.setInteger([*reference(i, "mode"), *reference(i, "n")], [2, 5])
+
+
+def get_integers(i: fmu.Fmu) -> Any:
+    return i.slave.getInteger([*reference(i, "n"), *reference(i, "mode")])
+
+
 def get_string(i: fmu.Fmu) -> Any:
     return i.slave.getString([0])
 
@@ -120,6 +128,7 @@ FAR = 2**31
 # Each list of calls up to one that is refused, or that only warns, and what follows a reset.
 CALLS: dict[str, list[Call]] = {
     "nothing wrong": [*START, set_to(c_a=0.5), get("c_a", "roll", "sample_time"), step(0.01), same_state, terminate],
+    "whole numbers": [setup(), set_integers, enter, get_integers, leave, step(0.0), get_integers],
     "a fixed parameter is set after the start": [*START, set_to(g=5.0)],
     "an output is set": [*START, set_to(roll=1.0)],
     "the clock is set": [setup(), set_to(sample_time=1.0)],
@@ -198,7 +207,7 @@ def test_both_kinds_answer_the_same_calls_alike(calls: list[Call]) -> None:
 
 def test_what_is_wrong_is_refused_and_nothing_else() -> None:
     """The lists above do end in errors, so that equal answers are no equal silence."""
-    well = {"nothing wrong", "a get after terminate", "only warnings are wanted", "a reset"}
+    well = {"nothing wrong", "whole numbers", "a get after terminate", "only warnings are wanted", "a reset"}
     well |= {"an input is not a number", "an input is infinite"}
     for name, calls in CALLS.items():
         instance = fmu.Fmu("lee2012", kind="native")
