@@ -89,6 +89,8 @@ def test_a_host_gets_the_numbers_of_our_master_from_each_system(
     file = pack(locate(system), tmp_path / "system.ssp", native=kind == "native")
     ours = System.read(file)
     h = ours.description.step or H
+    if host == "libcosim":
+        h = round(1e9 * h) / 1e9  # it counts nanoseconds
     expected = simulate(ours, stop_time=STEPS * h, step=h, jacobi=True)
     plants = {c.name for c in ours.description.components if isinstance(BLOCKS.get(c.source.stem), ContinuousBlock)}
     # After its last step a host holds a plant's values of that time, and samples of the time before.

@@ -40,7 +40,7 @@ class _DlInfo(ctypes.Structure):
 
 
 _RTLD_NOLOAD, _RTLD_NODELETE = 0x4, 0x1000  # of Linux
-_pinned: set[int] = set()  # addresses of the libraries that will let go at exit
+_pinned: set[int | None] = set()  # addresses of the libraries that will let go at exit
 
 
 def let_go_at_the_end(logger: int) -> None:
@@ -57,21 +57,20 @@ def let_go_at_the_end(logger: int) -> None:
     import _ctypes
 
     process, info = ctypes.CDLL(None), _DlInfo()
-    table = ctypes.c_void_p.from_address(logger).value  # the first member of an object with virtual functions
-    if not process.dladdr(ctypes.c_void_p(table), ctypes.byref(info)) or not info.file or not info.base:
-        return
+    table = ctypes.c_void_p.from_address(logger)  # of functions: the first member of an object with virtual ones
     in_python = bool(sys.orig_argv)  # which an embedded interpreter has not
     stay = 0 if in_python else _RTLD_NODELETE
     try:
-        library = ctypes.PyDLL(os.fsdecode(info.file), os.RTLD_NOW | _RTLD_NOLOAD | stay)
-        finalize = library.finalizePythonInterpreter
-    except (OSError, AttributeError):
+        process.dladdr(table, ctypes.byref(info))
+        library = ctypes.PyDLL(os.fsdecode(info.file or b""), os.RTLD_NOW | _RTLD_NOLOAD | stay)
+        finalize, at_exit = library.finalizePythonInterpreter, process.__cxa_atexit
+    except (OSError, AttributeError):  # no such library or function: another wrapper, which this is not for
         return
     if in_python:
         finalize()
     elif info.base not in _pinned:
         _pinned.add(info.base)
-        process.__cxa_atexit(ctypes.cast(finalize, ctypes.c_void_p), None, None)
+        at_exit(ctypes.cast(finalize, ctypes.c_void_p), None, None)
     _ctypes.dlclose(library._handle)
 
 
