@@ -33,6 +33,7 @@ class Exchange:
             for variable in sorted(some, key=lambda v: v.causality != "output"):
                 self._variables[representation(variable)].append((name, variable))
         self.values = {kind: np.zeros(len(some), DTYPES[kind]) for kind, some in self._variables.items()}
+        self.rows = 0  # recorded
         self._place = {
             (component, variable.name): (kind, i)
             for kind, some in self._variables.items()
@@ -72,15 +73,17 @@ class Exchange:
             for kind in self.values
         }
         self._tables = {kind: np.empty((rows, len(some)), DTYPES[kind]) for kind, some in self._sources.items()}
+        self.rows = 0
 
     def record(self, row: int) -> None:
         """Copy the present values into a row."""
         for kind, table in self._tables.items():
             self.values[kind].take(self._sources[kind], out=table[row], mode="clip")
+        self.rows = row + 1
 
     def columns(self) -> dict[str, np.ndarray]:
-        """Recorded variables by ``component.variable``."""
-        by_kind = {kind: iter(np.ascontiguousarray(table.T)) for kind, table in self._tables.items()}
+        """Recorded variables by ``component.variable``, as far as rows were recorded."""
+        by_kind = {kind: iter(np.ascontiguousarray(table[: self.rows].T)) for kind, table in self._tables.items()}
         return {f"{c}.{v}": next(by_kind[self._place[c, v][0]]) for c, v in self._recorded}
 
     def units(self) -> dict[str, str | None]:

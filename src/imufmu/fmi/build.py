@@ -50,8 +50,13 @@ def build_fmu(name: str, folder: Path) -> Path:
 
 def cached_fmu(name: str) -> Path:
     """Path of the FMU of a registered block in the user's cache, built when its source has changed."""
-    folder = user_cache_path("imufmu") / f"{__version__}-{source_digest([fmu_src_folder() / f'{name}_fmu.py'])}"
+    folder = cache_folder(name)
     return cached(folder / f"{name}.fmu", lambda: build_fmu(name, folder))
+
+
+def cache_folder(name: str) -> Path:
+    """Where ``cached_fmu`` keeps the FMU of this block, built from the source as it is."""
+    return user_cache_path("imufmu") / f"{__version__}-{source_digest([fmu_src_folder() / f'{name}_fmu.py'])}"
 
 
 def source_digest(sources: Sequence[Path]) -> str:

@@ -74,9 +74,14 @@ def cached_native_fmu(name: str) -> Path:
 
     Built when its source or the compiler has changed. Raises BuildError as ``build_native`` does.
     """
-    digest = hashlib.sha256(f"{source_digest(_wrapper())} {identity()}".encode()).hexdigest()
-    folder = user_cache_path("imufmu") / f"{__version__}-native-{digest[:16]}"
+    folder = native_cache_folder()
     return cached(folder / f"{block_called(name).name}.fmu", lambda: build_native(name, folder))
+
+
+def native_cache_folder() -> Path:
+    """Where ``cached_native_fmu`` keeps FMUs built from the source as it is. Raises BuildError without a compiler."""
+    digest = hashlib.sha256(f"{source_digest(_wrapper())} {identity()}".encode()).hexdigest()
+    return user_cache_path("imufmu") / f"{__version__}-native-{digest[:16]}"
 
 
 def block_called(name: str) -> Block:

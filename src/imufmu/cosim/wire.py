@@ -1,0 +1,116 @@
+"""What passes between a run and the process of a foreign FMU: commands and answers in pipes, values in shared memory.
+
+A command is of fixed size; a few bring data along, as JSON. The answer to it has a kind and a text. The shared memory
+is a file mapped by both: which call is being made, what the FMU said last, and a buffer per inlet and outlet.
+"""
+
+from __future__ import annotations
+
+import json
+import mmap
+import os
+import struct
+from collections.abc import Sequence
+from ctypes import c_int
+from enum import IntEnum, auto
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from .slave import DTYPES
+
+_COMMAND = struct.Struct("=iIddd")  # verb, bytes of data, three times
+_ANSWER = struct.Struct("=iI")  # done or failed, bytes of text
+_NOW, _SAID, _BUFFERS = 0, 8, 1024  # places in the shared memory
+_MOST_SAID = _BUFFERS - _SAID - 4
+_ALIGNED = 64  # bytes
+
+Numbers = tuple[float, float, float]
+
+
+class Verb(IntEnum):
+    """What the process is asked to do."""
+
+    ADVANCE = auto()
+    CONNECT = auto()
+    INSTANTIATE = auto()
+    ENTER = auto()
+    WRITE = auto()
+    READ_INITIAL = auto()
+    EXIT = auto()
+    READ = auto()
+    NOTES = auto()
+    FREE = auto()
+
+
+def send_command(pipe: int, verb: Verb, times: Numbers, data: Any = None) -> None:
+    """Raises BrokenPipeError where nobody listens any more."""
+    content = b"" if data is None else json.dumps(data).encode()
+    _write(pipe, _COMMAND.pack(verb, len(content), *times) + content)
+
+
+def receive_command(pipe: int) -> tuple[int, Numbers, Any]:
+    """The next command: verb, times, data. Raises EOFError where none can come any more."""
+    verb, size, *times = _COMMAND.unpack(_read(pipe, _COMMAND.size))
+    return verb, (times[0], times[1], times[2]), json.loads(_read(pipe, size)) if size else None
+
+
+def send_answer(pipe: int, good: bool, text: str = "") -> None:
+    """good: False with the text of the error."""
+    content = text.encode(errors="replace")
+    _write(pipe, _ANSWER.pack(good, len(content)) + content)
+
+
+def receive_answer(pipe: int) -> tuple[bool, str]:
+    """The answer to the last command. Raises EOFError where none can come any more."""
+    good, size = _ANSWER.unpack(_read(pipe, _ANSWER.size))
+    return bool(good), _read(pipe, size).decode() if size else ""
+
+
+def _write(pipe: int, content: bytes) -> None:
+    written = os.write(pipe, content)
+    while written < len(content):
+        written += os.write(pipe, content[written:])
+
+
+def _read(pipe: int, size: int) -> bytes:
+    content = os.read(pipe, size)
+    while len(content) < size:
+        more = os.read(pipe, size - len(content))
+        if not more:
+            raise EOFError
+        content += more
+    return content
+
+
+class Shared:
+    """Memory that two processes see. sizes: (kind, number of values) of each buffer, in order.
+
+    now: number of the call that is being made. buffers: arrays.
+    """
+
+    def __init__(self, path: Path, sizes: Sequence[tuple[str, int]]) -> None:
+        places, end = [], _BUFFERS
+        for kind, count in sizes:
+            places.append(end)
+            end += -(-count * np.dtype(DTYPES[kind]).itemsize // _ALIGNED) * _ALIGNED
+        with path.open("a+b") as file:
+            file.truncate(end)
+            self._memory = mmap.mmap(file.fileno(), end)
+        self.now = c_int.from_buffer(self._memory, _NOW)
+        self.buffers = [
+            np.frombuffer(self._memory, DTYPES[kind], count, place)
+            for (kind, count), place in zip(sizes, places, strict=True)
+        ]
+
+    @property
+    def said(self) -> str:
+        """What the FMU said last."""
+        size = min(int.from_bytes(self._memory[_SAID : _SAID + 4], "little"), _MOST_SAID)
+        return self._memory[_SAID + 4 : _SAID + 4 + size].decode(errors="replace")
+
+    def say(self, text: str) -> None:
+        """Leave a text for the case that the process cannot answer any more."""
+        content = text.encode(errors="replace")[:_MOST_SAID]
+        self._memory[_SAID : _SAID + 4 + len(content)] = len(content).to_bytes(4, "little") + content
