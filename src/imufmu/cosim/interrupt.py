@@ -14,19 +14,15 @@ from types import FrameType
 _ASKING_TO_END = [getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name)]
 
 
-class Terminated(KeyboardInterrupt):
-    """The process was asked to end by a signal other than that of Ctrl-C."""
-
-    number = signal.SIGTERM
+class Terminated(SystemExit):
+    """The process was asked to end by a signal other than that of Ctrl-C; the exit code is the shell's for it."""
 
 
 def raise_at_once(number: int, frame: FrameType | None) -> None:
     """Handler of a signal: raises KeyboardInterrupt, or Terminated."""
     if number == signal.SIGINT:
         signal.default_int_handler(number, frame)
-    error = Terminated()
-    error.number = signal.Signals(number)
-    raise error
+    raise Terminated(128 + number)
 
 
 def clean_up_when_asked_to_end() -> None:

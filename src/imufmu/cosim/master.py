@@ -26,7 +26,7 @@ import numpy as np
 from .apart import Instance, Instances
 from .errors import STEP_TIMEOUT, SimulationError
 from .exchange import Exchange
-from .interrupt import interrupt_between_calls
+from .interrupt import Terminated, interrupt_between_calls
 from .order import signal_flow
 from .results import Result
 from .settings import Setting
@@ -106,9 +106,9 @@ def simulate(
                 notes += slave.notes
             for slave in slaves.values():
                 slave.close()
-    except (SimulationError, KeyboardInterrupt) as error:
+    except (SimulationError, KeyboardInterrupt, Terminated) as error:
         if exchange.rows:
-            reason = str(error) or "interrupted"
+            reason = str(error) if isinstance(error, SimulationError) else "interrupted"
             error.result = result(f"{exchange.rows} of {ticks.count + 1} rows: {reason}")  # type: ignore[union-attr]
         raise
     return result()

@@ -21,7 +21,7 @@ from ..registry import BLOCKS, ESTIMATORS
 from .apart import Instance, Instances
 from .errors import STEP_TIMEOUT, SimulationError
 from .interface import Interface, WiringError, unit_of
-from .interrupt import interrupt_between_calls
+from .interrupt import Terminated, interrupt_between_calls
 from .results import partial_remark
 from .settings import Setting, given_settings
 from .slave import Inlet, Outlet
@@ -122,9 +122,10 @@ def replay(
             run(slave, settings, check, progress)
             notes += slave.notes
             slave.close()
-    except (SimulationError, KeyboardInterrupt) as error:
+    except (SimulationError, KeyboardInterrupt, Terminated) as error:
         if run.done:
-            error.result = result(str(error) or "interrupted")  # type: ignore[union-attr]
+            reason = str(error) if isinstance(error, SimulationError) else "interrupted"
+            error.result = result(reason)  # type: ignore[union-attr]
         raise
     return result()
 
