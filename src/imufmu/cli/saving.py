@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 from ..cosim.errors import SimulationError
-from ..cosim.interrupt import Terminated
 from .console import notes
 
 
@@ -20,15 +19,14 @@ def save(result: Any, path: Path | None) -> None:
 
 @contextmanager
 def kept(path: Path | None) -> Iterator[None]:
-    """Write the rows of a run that fails or is interrupted, marked as partial."""
+    """Write the rows of a run that fails, marked as partial. Who interrupts a run wants no file of it."""
     try:
         yield
-    except (SimulationError, KeyboardInterrupt, Terminated) as error:
-        result = getattr(error, "result", None)
-        if path and result is not None:
+    except SimulationError as error:
+        if path and error.result is not None:
             try:
-                save(result, path)
-                notes([f"{path} is partial: {result.partial.partition(':')[0]}"])
+                save(error.result, path)
+                notes([f"{path} is partial: {error.result.partial.partition(':')[0]}"])
             except OSError as fault:
                 notes([str(fault)])
         raise

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import sys
 from collections.abc import Callable, Sequence
 from contextlib import suppress
@@ -20,7 +21,7 @@ from .wire import Numbers, Shared, Verb, receive_answer, send_command
 _START_TIMEOUT = 60.0  # s, of Python itself, however short the user's patience with the FMU
 _LAST_TIMEOUT = 5.0  # s, to be freed after another component has failed
 
-# Run by the interpreter of the new process; see worker.py.
+# Run by the new process, whose arguments are the folder of this file and the number of this process; see worker.py.
 _BOOT = """
 import sys, types
 package = types.ModuleType("imufmu_worker")
@@ -46,7 +47,7 @@ class Guest:
         self._busy = self._gone = False
         self._inputs = Inputs([], [])
         self._outlets: list[tuple[Outlet, np.ndarray]] = []
-        boot = ("-u", "-P", "-c", _BOOT, str(Path(__file__).parent))
+        boot = ("-u", "-P", "-c", _BOOT, str(Path(__file__).parent), str(os.getpid()))
         try:
             self._child = Child(boot, scratch, _hand_on)
         except OSError as error:

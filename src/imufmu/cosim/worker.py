@@ -41,7 +41,7 @@ class Start(NamedTuple):
 def main() -> NoReturn:
     """Serve until there is nothing more to do."""
     commands, answers = _own_pipes()
-    threading.Thread(target=_end_with, args=(os.getppid(),), daemon=True).start()
+    threading.Thread(target=_end_with, args=(int(sys.argv[2]),), daemon=True).start()
     _keep_quiet()
     server = _Server()
     with suppress(EOFError):
