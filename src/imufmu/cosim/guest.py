@@ -169,7 +169,7 @@ class Guest:
         at = when(time, h) if number == DO_STEP else when(reached if call.startswith("fmi2Get") else time)
         self._gone = True
         self._child.kill()
-        said = self._shared.said or self._child.last_words
+        said = self._shared.said or self._child.last_lines.replace("\n", " | ")
         return SimulationError(f"{self.name}: {call} {fate} at {at}{quoted(said)}")
 
 

@@ -90,10 +90,10 @@ class Child:
         return "closed the connection to its process"
 
     @property
-    def last_words(self) -> str:
-        """The last lines of its output."""
-        lines = [line.strip() for line in self._tail.decode(errors="replace").splitlines() if line.strip()]
-        return " | ".join(lines[-_QUOTED:])
+    def last_lines(self) -> str:
+        """The last lines of its output, without empty ones."""
+        lines = self._tail.decode(errors="replace").splitlines()
+        return "\n".join([line.strip() for line in lines if line.strip()][-_QUOTED:])
 
     def end(self) -> None:
         """Wait a moment for its end, and see that it and all it has started are gone."""
