@@ -151,6 +151,15 @@ def test_an_estimator_is_a_name_or_a_file():
         estimator_fmu("lee2013")
 
 
+@pytest.mark.parametrize("name", ["Käse", "50%", "a#b", "it's"])
+def test_a_temporary_folder_that_fmus_do_not_understand_is_not_used(name, tmp_path, rng, monkeypatch):
+    odd = tmp_path / name
+    odd.mkdir()
+    monkeypatch.setattr("tempfile.tempdir", str(odd))
+    recording = recordings.read(record(tmp_path / "r.csv", rng, n=20))
+    assert len(replay(recording, cached_fmu("lee2012")).columns["roll"]) == 20
+
+
 def test_replays_leave_nothing_behind(tmp_path, rng, monkeypatch):
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
     (tmp_path / "in").mkdir()
