@@ -47,6 +47,8 @@ class Guest:
         self._busy = self._gone = False
         self._inputs = Inputs([], [])
         self._outlets: list[tuple[Outlet, np.ndarray]] = []
+        if not sys.executable:
+            raise SimulationError(f"{name}: this program has no Python to start for it; run it in_process")
         boot = ("-u", "-P", "-c", _BOOT, str(Path(__file__).parent), str(os.getpid()))
         try:
             self._child = Child(boot, scratch, _hand_on)
@@ -58,7 +60,10 @@ class Guest:
         ends: list[Inlet | Outlet] = [*inlets, *outlets]
         sizes = [(end.kind, len(end.variables)) for end in ends]
         memory = self._scratch / "memory"
-        self._shared = Shared(memory, sizes)
+        try:
+            self._shared = Shared(memory, sizes)
+        except OSError as error:
+            raise SimulationError(f"{self.name}: {memory} cannot be written: {error.strerror or error}") from error
         self._inputs = Inputs(inlets, self._shared.buffers[: len(inlets)])
         self._outlets = list(zip(outlets, self._shared.buffers[len(inlets) :], strict=True))
         plan = {

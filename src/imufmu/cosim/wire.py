@@ -87,7 +87,7 @@ def _read(pipe: int, size: int) -> bytes:
 class Shared:
     """Memory that two processes see. sizes: (kind, number of values) of each buffer, in order.
 
-    now: number of the call that is being made. buffers: arrays.
+    now: number of the call that is being made. buffers: arrays. Raises OSError where the disk is full.
     """
 
     def __init__(self, path: Path, sizes: Sequence[tuple[str, int]]) -> None:
@@ -96,7 +96,9 @@ class Shared:
             places.append(end)
             end += -(-count * np.dtype(DTYPES[kind]).itemsize // _ALIGNED) * _ALIGNED
         with path.open("a+b") as file:
-            file.truncate(end)
+            if file.tell() == 0:
+                file.write(bytes(end))  # not left as a hole: a disk that is full says so here, not by a signal later
+                file.flush()
             self._memory = mmap.mmap(file.fileno(), end)
         self.now = c_int.from_buffer(self._memory, _NOW)
         self.buffers = [
