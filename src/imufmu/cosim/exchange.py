@@ -39,6 +39,19 @@ class Exchange:
             for kind, some in self._variables.items()
             for i, (component, variable) in enumerate(some)
         }
+        self._begin()
+
+    def _begin(self) -> None:
+        """Values before the first exchange, read by the broken end of a loop: the start of the output, or the input."""
+        for link in self._links:
+            start = link.target[1].start
+            if start is not None and link.factor:
+                kind, place = self._place[link.source[0], link.source[1].name]
+                self.values[kind][place] = (_number(start) - link.offset) / link.factor
+        for kind, place in self._place.values():
+            start = self._variables[kind][place][1].start
+            if start is not None:
+                self.values[kind][place] = _number(start)
 
     def outlets(self, component: str) -> list[Outlet]:
         """What a component reads."""
@@ -90,6 +103,12 @@ class Exchange:
         """Units by ``component.variable``."""
         every = [pair for some in self._variables.values() for pair in some]
         return {f"{component}.{variable.name}": unit_of(variable) for component, variable in every}
+
+
+def _number(start: Any) -> float:
+    """A start value, which fmpy leaves as text."""
+    text = str(start).strip()
+    return float(text == "true") if text in ("true", "false") else float(text)
 
 
 def _outputs(system: System) -> list[Name]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
@@ -169,9 +169,10 @@ class _Run:
 
 def _inputs(interface: Interface, recording: Recording, fmu: Path) -> tuple[list[Any], np.ndarray, list[str]]:
     """Input variables of the FMU that the recording feeds, their values at every instant, and notes."""
-    problems, notes, used, columns = [], [], [], []
+    notes: list[str] = []
+    problems, used, columns = [], [], []
     instants = recording.at_instants()
-    inputs = {v.name: v for v in interface.of("input")}
+    inputs = _from_one(interface.of("input"), notes)
     for name, signal in _READINGS.items():
         wanted = [element for element in signal.element_names() if element in inputs]
         if not wanted and name in instants:
@@ -191,7 +192,7 @@ def _inputs(interface: Interface, recording: Recording, fmu: Path) -> tuple[list
             columns.append(instants[name][:, i])
     if problems:
         raise WiringError(fmu, problems, f"cannot replay {recording.path}")
-    free = [name for name in inputs if name not in {v.name for v in used}]
+    free = [variable.name for variable in inputs.values() if variable not in used]
     if free:
         notes.append(f"inputs not in the recording stay at their start values: {', '.join(free)}")
     readings = np.column_stack(columns)
@@ -200,6 +201,17 @@ def _inputs(interface: Interface, recording: Recording, fmu: Path) -> tuple[list
         readings = hold_missing(readings)
         notes.append(f"{missing.sum()} of {len(readings)} samples are incomplete; held, as the FMU has no status")
     return used, readings, notes
+
+
+def _from_one(inputs: Sequence[Any], notes: list[str]) -> dict[str, Any]:
+    """Inputs by name; those of a reading whose FMU counts from 0 by the names of the same axes that count from 1."""
+    names = {variable.name: variable for variable in inputs}
+    for reading in _READINGS:
+        if f"{reading}[0]" in names:
+            axes = [names.pop(f"{reading}[{i}]", None) for i in range(3)]
+            names |= {f"{reading}[{i}]": axis for i, axis in enumerate(axes, 1) if axis is not None}
+            notes.append(f"inputs {reading}[0], [1], [2] count from 0: taken for the axes x, y, z")
+    return names
 
 
 def _settings(interface: Interface, recording: Recording, parameters: dict[str, Any], fmu: Path) -> tuple[Setting, ...]:
