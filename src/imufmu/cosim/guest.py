@@ -144,12 +144,12 @@ class Guest:
             self._gone = True
             self._child.kill()
 
-    def _request(self, verb: Verb, *times: float, data: Any = None) -> str:
+    def _request(self, verb: int, *times: float, data: Any = None) -> str:
         """Have the process do something, and wait for its answer. times: of a step all three, else one."""
         self._send(verb, (times[0], times[1], times[2]) if len(times) > 1 else (times[0], 0.0, times[0]), data)
         return self._receive(self._limit)
 
-    def _send(self, verb: Verb, times: Numbers, data: Any = None) -> None:
+    def _send(self, verb: int, times: Numbers, data: Any = None) -> None:
         self._times, self._busy = times, True
         with suppress(BrokenPipeError):  # that it is gone is found where the answer is awaited
             send_command(self._child.requests, verb, times, data)

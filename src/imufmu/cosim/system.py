@@ -108,10 +108,10 @@ def _read(path: Path, native: bool, inside: Path | None = None) -> System:
     models: dict[Path, Any] = {}
     parts = []
     for component in description.components:
-        fmu = _fmu_file(component, path, native)
+        fmu, ours = _fmu_file(component, path, native)
         if fmu not in models:
             models[fmu] = read_fmu(fmu)
-        parts.append(Part(component.name, fmu, models[fmu], is_ours(fmu)))
+        parts.append(Part(component.name, fmu, models[fmu], ours))
     interfaces = {part.name: _interface(part) for part in parts}
     problems = _instance_problems(parts)
     notes: list[str] = []
@@ -135,12 +135,12 @@ def _check_names(description: Description) -> None:
             raise DescriptionError(f"{where}: the name occurs twice; rename one of them")
 
 
-def _fmu_file(component: Component, path: Path, native: bool) -> Path:
-    """The component's FMU, built if it is one of ours and not there."""
+def _fmu_file(component: Component, path: Path, native: bool) -> tuple[Path, bool]:
+    """The component's FMU, built if it is one of ours and not there, and whether it is ours."""
     if component.source.is_file():
-        return component.source
+        return component.source, is_ours(component.source)
     if component.source.stem in BLOCKS:
-        return (cached_native_fmu if native else cached_fmu)(component.source.stem)
+        return (cached_native_fmu if native else cached_fmu)(component.source.stem), True
     raise DescriptionError(
         f"{path}, line {component.line}: component {component.name!r}: there is no file {component.source}, and no "
         f"block of imufmu is called {component.source.stem!r}; there is {', '.join(BLOCKS)}"

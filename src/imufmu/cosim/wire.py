@@ -12,7 +12,6 @@ import os
 import struct
 from collections.abc import Sequence
 from ctypes import c_int
-from enum import IntEnum, auto
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +21,7 @@ from .slave import DTYPES
 
 _COMMAND = struct.Struct("=iIddd")  # verb, bytes of data, three times
 _ANSWER = struct.Struct("=iI")  # done or failed, bytes of text
+_DONE = _ANSWER.pack(True, 0)
 _NOW, _SAID, _BUFFERS = 0, 8, 1024  # places in the shared memory
 _MOST_SAID = _BUFFERS - _SAID - 4
 _ALIGNED = 64  # bytes
@@ -29,42 +29,42 @@ _ALIGNED = 64  # bytes
 Numbers = tuple[float, float, float]
 
 
-class Verb(IntEnum):
-    """What the process is asked to do."""
+class Verb:
+    """What the process is asked to do. Plain numbers: members of an Enum would cost more than the pipe."""
 
-    ADVANCE = auto()
-    CONNECT = auto()
-    INSTANTIATE = auto()
-    ENTER = auto()
-    WRITE = auto()
-    READ_INITIAL = auto()
-    EXIT = auto()
-    READ = auto()
-    NOTES = auto()
-    FREE = auto()
+    ADVANCE, CONNECT, INSTANTIATE, ENTER, WRITE, READ_INITIAL, EXIT, READ, NOTES, FREE = range(10)
 
 
-def send_command(pipe: int, verb: Verb, times: Numbers, data: Any = None) -> None:
+def send_command(pipe: int, verb: int, times: Numbers, data: Any = None) -> None:
     """Raises BrokenPipeError where nobody listens any more."""
-    content = b"" if data is None else json.dumps(data).encode()
-    _write(pipe, _COMMAND.pack(verb, len(content), *times) + content)
+    if data is None:
+        os.write(pipe, _COMMAND.pack(verb, 0, *times))  # so short that it is written whole
+    else:
+        content = json.dumps(data).encode()
+        _write(pipe, _COMMAND.pack(verb, len(content), *times) + content)
 
 
 def receive_command(pipe: int) -> tuple[int, Numbers, Any]:
     """The next command: verb, times, data. Raises EOFError where none can come any more."""
-    verb, size, *times = _COMMAND.unpack(_read(pipe, _COMMAND.size))
-    return verb, (times[0], times[1], times[2]), json.loads(_read(pipe, size)) if size else None
+    verb, size, time, h, reached = _COMMAND.unpack(_read(pipe, _COMMAND.size))
+    return verb, (time, h, reached), json.loads(_read(pipe, size)) if size else None
 
 
 def send_answer(pipe: int, good: bool, text: str = "") -> None:
     """good: False with the text of the error."""
-    content = text.encode(errors="replace")
-    _write(pipe, _ANSWER.pack(good, len(content)) + content)
+    if good and not text:
+        os.write(pipe, _DONE)
+    else:
+        content = text.encode(errors="replace")
+        _write(pipe, _ANSWER.pack(good, len(content)) + content)
 
 
 def receive_answer(pipe: int) -> tuple[bool, str]:
     """The answer to the last command. Raises EOFError where none can come any more."""
-    good, size = _ANSWER.unpack(_read(pipe, _ANSWER.size))
+    header = _read(pipe, _ANSWER.size)
+    if header == _DONE:
+        return True, ""
+    good, size = _ANSWER.unpack(header)
     return bool(good), _read(pipe, size).decode() if size else ""
 
 

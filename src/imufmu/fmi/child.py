@@ -69,6 +69,8 @@ class Child:
 
         check: called every 0.1 s; what it raises ends the waiting.
         """
+        if self._ready(min(seconds, 0.1)):
+            return True
         deadline = time.monotonic() + seconds
         while not self._ready(min(seconds, 0.1)):
             check()
