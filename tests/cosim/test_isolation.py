@@ -41,6 +41,8 @@ FAULTS = {
     Fault.STATUS_MINUS_5: rf"^rogue: fmi2DoStep failed with status -5 \(.*\) {PLACE}",
     Fault.STATUS_99: rf"^rogue: fmi2DoStep failed with status 99 \(.*\) {PLACE}",
     Fault.FORK_AND_EXIT: rf"^rogue: fmi2DoStep ended its process with exit code 0 {PLACE}",
+    # It goes on meanwhile: with the next call or not.
+    Fault.GARBLE: r"^rogue: fmi2(DoStep|GetReal) garbled the connection to its process at t = 0\.(5|625) s",
     Fault.CRASH_IN_FREE: r"^rogue: fmi2FreeInstance crashed its process \(SIGSEGV\) at t = 1 s",
     Fault.HANG_IN_FREE: r"^rogue: fmi2FreeInstance gave no answer within 1 s at t = 1 s",
 }

@@ -59,6 +59,7 @@ static int step_at_fault(Instance *self) {
     case 15: close(0); close(1); close(2); break;
     case 16: raise(SIGINT); break;
     case 17: if (!(child = fork())) hang(0); say(self, WARNING, "started %d", child); break;
+    case 19: for (int file = 3; file < 20; ++file) if (write(file, "garbage, and more of it", 23)) continue; break;
     default: break;
     }
     return 0;

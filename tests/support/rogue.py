@@ -39,6 +39,7 @@ class Fault(IntEnum):
     SIGINT = auto()
     CHILD = auto()
     BAD_INITIALISATION = auto()
+    GARBLE = auto()
 
 
 def rogue() -> Path:

@@ -155,10 +155,13 @@ class Guest:
             send_command(self._child.requests, verb, times, data)
 
     def _receive(self, limit: float) -> str:
-        if not self._child.wait(limit, self._check):
+        def wait() -> bool:
+            return self._child.wait(limit, self._check)
+
+        if not wait():
             raise self._lost(f"gave no answer within {limit:g} s")
         try:
-            good, text = receive_answer(self._child.answers)
+            good, text = receive_answer(self._child.answers, wait)
         except EOFError:
             raise self._lost(self._child.fate()) from None
         self._busy = False

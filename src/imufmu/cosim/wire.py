@@ -10,7 +10,7 @@ import json
 import mmap
 import os
 import struct
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from ctypes import c_int
 from pathlib import Path
 from typing import Any
@@ -22,6 +22,7 @@ from .slave import DTYPES
 _COMMAND = struct.Struct("=iIddd")  # verb, bytes of data, three times
 _ANSWER = struct.Struct("=iI")  # done or failed, bytes of text
 _DONE = _ANSWER.pack(True, 0)
+_LONGEST_ANSWER = 2**20  # bytes
 _NOW, _SAID, _BUFFERS = 0, 8, 1024  # places in the shared memory
 _MOST_SAID = _BUFFERS - _SAID - 4
 _ALIGNED = 64  # bytes
@@ -59,13 +60,27 @@ def send_answer(pipe: int, good: bool, text: str = "") -> None:
         _write(pipe, _ANSWER.pack(good, len(content)) + content)
 
 
-def receive_answer(pipe: int) -> tuple[bool, str]:
-    """The answer to the last command. Raises EOFError where none can come any more."""
-    header = _read(pipe, _ANSWER.size)
+def receive_answer(pipe: int, wait: Callable[[], bool]) -> tuple[bool, str]:
+    """The answer to the last command, the beginning of which is there.
+
+    wait: waits for more; False where there is none in time. Raises EOFError where no answer can come any more, also
+    where there is something in its place that is none.
+    """
+    header = os.read(pipe, _ANSWER.size)
     if header == _DONE:
         return True, ""
+    if len(header) < _ANSWER.size:
+        raise EOFError
     good, size = _ANSWER.unpack(header)
-    return bool(good), _read(pipe, size).decode() if size else ""
+    if good not in (True, False) or size > _LONGEST_ANSWER:
+        raise EOFError
+    text = b""
+    while len(text) < size:
+        more = os.read(pipe, size - len(text)) if wait() else b""
+        if not more:
+            raise EOFError
+        text += more
+    return bool(good), text.decode(errors="replace")
 
 
 def _write(pipe: int, content: bytes) -> None:

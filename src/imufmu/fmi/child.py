@@ -82,14 +82,14 @@ class Child:
         return True
 
     def fate(self) -> str:
-        """How the process ended, for a message, once it answers no more. Ends it where it still runs."""
+        """How the process ended, for a message, once it answers no more."""
         with suppress(subprocess.TimeoutExpired):
             code = self._process.wait(_GRACE)
             self._reader.join(_GRACE)
             if code < 0:
                 return f"crashed its process ({_signal_name(-code)})"
             return f"ended its process with exit code {code}"
-        return "closed the connection to its process"
+        return "garbled the connection to its process"
 
     @property
     def last_lines(self) -> str:
