@@ -12,6 +12,7 @@ import pytest
 
 from imufmu import SimulationError
 from imufmu.benchmarks import speed as speed_module
+from imufmu.benchmarks import speed_isolation
 from imufmu.benchmarks.speed import Speed, speed, tables, write_json
 from imufmu.benchmarks.speed_ways import NATIVE_IN_C, Trip, in_c_host
 from imufmu.compiled.compilers import compile_program, has_ziglang
@@ -29,6 +30,7 @@ def result() -> Speed:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(speed_module, "_RECORD", 1.0)
         patch.setattr(speed_module, "_SYSTEM_TIMES", {True: 0.1, False: 0.1})
+        patch.setattr(speed_isolation, "_STEPS", 100)
         return speed(["lee2012"], [200.0], repeats=1)
 
 
@@ -49,11 +51,15 @@ def test_a_system_of_each_kind_of_fmu_is_measured_against_real_time(result: Spee
     assert all(s.times_real_time == s.simulated / s.seconds for s in result.systems)
 
 
+def test_a_process_of_its_own_is_measured_beside_this_one(result: Speed) -> None:
+    assert [i.fmus for i in result.isolation] == ["in this process", "in a process each"]
+
+
 def test_the_file_holds_what_the_tables_show(result: Speed, tmp_path: Path) -> None:
     write_json(tmp_path / "speed.json", result)
     content = json.loads((tmp_path / "speed.json").read_text())
     shown = [len(table.rows) for table in tables(result)]
-    assert shown == [len(content["timings"]), len(content["systems"])]
+    assert shown == [len(content[part]) for part in ("timings", "systems", "isolation", "starts")]
     assert content["machine"]["processor"] and "imufmu" in content["machine"]
 
 

@@ -10,12 +10,12 @@ import pytest
 from fmpy.ssp.ssd import read_ssd
 from lxml import etree
 
-from imufmu import ArchiveError, DescriptionError, System, locate, pack, simulate
+from imufmu import ArchiveError, DescriptionError, System, locate, pack
 from imufmu.cosim import system as system_module
 from imufmu.cosim.description import NAMESPACES
 from imufmu.cosim.packing import PARAMETER_SET
 from imufmu.registry import BLOCKS
-from support.cosim_stubs import binding, fake_fmu, parameter_set, stub, variable, write_ssd, write_zip
+from support.cosim_stubs import binding, fake_fmu, parameter_set, simulate, stub, variable, write_ssd, write_zip
 
 
 @pytest.fixture

@@ -10,9 +10,9 @@ import fmpy
 import numpy as np
 import pytest
 
-from imufmu import WiringError, simulate
+from imufmu import WiringError
 from imufmu.cosim import master
-from support.cosim_stubs import Call, binding, recorded_calls, stub, write_ssd
+from support.cosim_stubs import Call, binding, recorded_calls, simulate, stub, write_ssd
 
 H = 0.25  # s, a power of two: every time below is exact
 TIMES = np.arange(5) * H

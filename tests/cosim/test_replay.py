@@ -110,6 +110,21 @@ def test_missing_samples_are_held_for_an_fmu_that_cannot_say_it_misses_them(tmp_
     assert any("31 of 400 samples are incomplete; held" in note for note in result.notes)
 
 
+def test_inputs_that_count_from_0_are_the_same_axes(tmp_path, rng):
+    from_0 = tmp_path / "from_0.fmu"
+    with zipfile.ZipFile(cached_fmu("lee2012")) as source, zipfile.ZipFile(from_0, "w") as target:
+        for member in source.namelist():
+            content = source.read(member)
+            for i in (1, 2, 3):
+                for name in ("gyro", "accel"):
+                    content = content.replace(f'name="{name}[{i}]"'.encode(), f'name="{name}[{i - 1}]"'.encode())
+            target.writestr(member, content)
+    recording = recordings.read(record(tmp_path / "r.csv", rng, n=50))
+    result = replay(recording, from_0)
+    assert np.array_equal(result.columns["roll"], replay(recording, cached_fmu("lee2012")).columns["roll"])
+    assert sum("count from 0" in note for note in result.notes) == 2
+
+
 def test_the_sample_period_follows_the_recording_and_no_other_is_accepted(tmp_path, rng):
     recording = recordings.read(record(tmp_path / "r.csv", rng))
     with pytest.raises(WiringError, match=r"sample_period = 0.01 s, but .*r.csv has a sample every 0.0035 s"):
@@ -149,6 +164,15 @@ def test_an_estimator_is_a_name_or_a_file():
     assert estimator_fmu("some/filter.fmu") == Path("some/filter.fmu")
     with pytest.raises(ValueError, match="no estimator is called 'lee2013'; there is lee2012"):
         estimator_fmu("lee2013")
+
+
+@pytest.mark.parametrize("name", ["Käse", "50%", "a#b", "it's"])
+def test_a_temporary_folder_that_fmus_do_not_understand_is_not_used(name, tmp_path, rng, monkeypatch):
+    odd = tmp_path / name
+    odd.mkdir()
+    monkeypatch.setattr("tempfile.tempdir", str(odd))
+    recording = recordings.read(record(tmp_path / "r.csv", rng, n=20))
+    assert len(replay(recording, cached_fmu("lee2012")).columns["roll"]) == 20
 
 
 def test_replays_leave_nothing_behind(tmp_path, rng, monkeypatch):

@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 
 from imufmu import System, WiringError
+from imufmu.cosim.exchange import Exchange
 from support.cosim_stubs import binding, fake_fmu, parameter_set, variable, write_ssd
 
 PLANT = [
@@ -282,3 +283,24 @@ def test_an_fmu_for_one_instance_is_not_used_twice(tmp_path: Path) -> None:
     fmu = fake_fmu(tmp_path / "a.fmu", [variable("y", "output")], once=True)
     with pytest.raises(WiringError, match="two: its FMU can be instantiated once, and one uses it already"):
         System.read(write_ssd(tmp_path / "b.ssd", {"one": fmu, "two": fmu}))
+
+
+def state(name: str, start: float) -> str:
+    """An output with a start value of its own."""
+    return variable(name, "output", start=str(start)).replace("variability=", 'initial="exact" variability=')
+
+
+def test_a_state_with_a_start_value_of_its_own_can_be_set(tmp_path: Path) -> None:
+    fmu = fake_fmu(tmp_path / "a.fmu", [state("angle", 0), variable("rate", "output")])
+    system = System.read(write_ssd(tmp_path / "a.ssd", {"a": fmu}))
+    assert [setting.value for setting in system.settings_with({"a.angle": 0.1})] == [0.1]
+    with pytest.raises(WiringError, match=r"a\.rate = 1: no parameter of its FMU"):
+        system.settings_with({"a.rate": 1})
+
+
+def test_before_the_first_exchange_a_connection_carries_the_start_of_its_output_or_of_its_input(tmp_path: Path) -> None:
+    """What the broken end of a loop reads; a 0 there may be no value that the other end can take."""
+    fmu = fake_fmu(tmp_path / "a.fmu", [variable("u", "input", start="7"), state("x", 80), variable("y", "output")])
+    wires = ["a.x -> b.u", "b.y -> a.u |<ssc:LinearTransformation factor='2' offset='3'/>"]
+    exchange = Exchange(System.read(write_ssd(tmp_path / "a.ssd", {"a": fmu, "b": fmu}, wires)), ["a.x", "b.y"])
+    assert exchange.values["Real"].tolist() == [80.0, 2.0]  # 2 * 2 + 3 = 7

@@ -13,7 +13,6 @@ from imufmu.fmi import doctor
 from imufmu.fmi.build import cached_fmu
 from imufmu.fmi.doctor import Level, examine
 from imufmu.fmi.native import cached_native_fmu
-from imufmu.fmi.trial import HUNG, Trial
 from imufmu.registry import BLOCKS
 
 
@@ -102,9 +101,17 @@ def test_an_fmu_that_ends_its_process_instead_of_a_step_is_found(code, expected,
 
 
 def test_an_fmu_that_does_not_come_back_is_tried_once(changed, monkeypatch):
-    trials = iter([Trial(HUNG, "")])
-    monkeypatch.setattr(doctor, "try_step", lambda path: next(trials))
-    assert problems(changed())["one step"] == "it did not finish one step within 60 s."
+    script = b"import time\nfrom pythonfmu import Fmi2Slave\nclass Lee2012(Fmi2Slave):\n    pass\ntime.sleep(1e6)\n"
+    tried, once = [], doctor.try_step
+
+    def counted(path, seconds):
+        tried.append(path)
+        return once(path, seconds)
+
+    monkeypatch.setattr(doctor, "try_step", counted)
+    found = {f.topic: f.text for f in examine(changed({"resources/lee2012_fmu.py": script}), step_timeout=3.0)}
+    assert found["one step"] == "it did not finish one step within 3 s."
+    assert len(tried) == 1
 
 
 def test_the_trial_takes_a_step_where_the_default_step_is_zero(changed):

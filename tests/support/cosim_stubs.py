@@ -13,6 +13,8 @@ import fmpy.fmi1
 import pytest
 from pythonfmu.builder import FmuBuilder
 
+import imufmu
+from imufmu import Result
 from imufmu.cosim.description import NAMESPACES
 from imufmu.cosim.slave import Slave
 from support.places import built_once
@@ -288,6 +290,11 @@ def write_ssd(
     ]
     path.write_text("\n".join(lines))
     return path
+
+
+def simulate(*args: Any, **options: Any) -> Result:
+    """imufmu.simulate with the stubs in this process, where their calls can be watched and no start is paid for."""
+    return imufmu.simulate(*args, in_process=True, **options)
 
 
 def recorded_calls(monkeypatch: pytest.MonkeyPatch) -> list[Call]:

@@ -16,7 +16,6 @@ from dataclasses import asdict, dataclass
 from importlib.metadata import version
 from pathlib import Path
 from statistics import median
-from tempfile import TemporaryDirectory
 from time import perf_counter
 
 import numpy as np
@@ -27,11 +26,13 @@ from ..compiled.compilers import identity
 from ..cosim.master import simulate
 from ..cosim.system import System, locate
 from ..files.atomic import atomic_write
+from ..files.scratch import scratch_folder
 from ..papers.experiment import Progress
 from ..papers.motions import parameter_set, record
 from ..plants import handheld
 from ..registry import BLOCKS
 from ..scoring.table import Table
+from .speed_isolation import IsolationTiming, isolation_timings
 from .speed_start import StartTiming, start_timings
 from .speed_ways import NATIVE_IN_C, Trip, ways
 
@@ -80,6 +81,7 @@ class Speed:
     machine: Mapping[str, str]
     timings: Sequence[Timing]
     systems: Sequence[SystemTiming]
+    isolation: Sequence[IsolationTiming]
     starts: Sequence[StartTiming]
 
 
@@ -100,7 +102,7 @@ def speed(
     trips = [trip for name in names for trip in _trips(name, rates)]
     systems = _SYSTEM_REPEATS if with_system else 0
     starts = repeats if with_starts else 0
-    total = len(trips) * repeats + systems + starts
+    total = len(trips) * repeats + 2 * systems + starts
     done = 0
 
     def one_more() -> None:
@@ -110,7 +112,8 @@ def speed(
             progress(done, total)
 
     timings = [timing for trip in trips for timing in _measured(trip, repeats, one_more)]
-    return Speed(_machine(), timings, _system_timings(systems, one_more), start_timings(starts, one_more))
+    measured, isolation = _system_timings(systems, one_more)
+    return Speed(_machine(), timings, measured, isolation, start_timings(starts, one_more))
 
 
 def _trips(name: str, rates: Sequence[float]) -> list[Trip]:
@@ -139,7 +142,7 @@ def _inputs(block: SampledBlock, period: float) -> dict[str, np.ndarray]:
 
 def _measured(trip: Trip, repeats: int, one_more: Callable[[], None]) -> list[Timing]:
     with ExitStack() as stack:
-        folder = Path(stack.enter_context(TemporaryDirectory(prefix="imufmu_speed_", ignore_cleanup_errors=True)))
+        folder = stack.enter_context(scratch_folder("speed"))
         measure = ways(trip, folder, stack)
         seconds: dict[str, list[float]] = {way: [] for way in measure}
         for _ in range(repeats):
@@ -153,8 +156,10 @@ def _measured(trip: Trip, repeats: int, one_more: Callable[[], None]) -> list[Ti
     ]
 
 
-def _system_timings(repeats: int, one_more: Callable[[], None]) -> list[SystemTiming]:
-    systems = {native: System.read(locate(_SYSTEM), native=native) for native in _SYSTEM_TIMES} if repeats else {}
+def _system_timings(repeats: int, one_more: Callable[[], None]) -> tuple[list[SystemTiming], list[IsolationTiming]]:
+    if not repeats:
+        return [], []
+    systems = {native: System.read(locate(_SYSTEM), native=native) for native in _SYSTEM_TIMES}
     sampled = [n for s in systems.values() for n, i in s.interfaces.items() if "sample_period" in i.variables]
     periods = {f"{component}.sample_period": _SYSTEM_STEP for component in sampled}
     seconds: dict[bool, list[float]] = {native: [] for native in systems}
@@ -165,10 +170,11 @@ def _system_timings(repeats: int, one_more: Callable[[], None]) -> list[SystemTi
             seconds[native].append(perf_counter() - began)
         one_more()
     kinds = {True: "native FMUs", False: "Python FMUs"}
-    return [
+    measured = [
         SystemTiming(_SYSTEM, _SYSTEM_STEP, kinds[native], _SYSTEM_TIMES[native], median(some))
         for native, some in seconds.items()
     ]
+    return measured, isolation_timings(systems[True], _SYSTEM_STEP, periods, repeats, one_more)
 
 
 def _machine() -> dict[str, str]:
@@ -193,7 +199,7 @@ def _processor() -> str:
 
 
 def tables(result: Speed) -> list[Table]:
-    """What a sample costs, what a system costs, and a start."""
+    """What a sample costs, what a system costs, a process for each FMU, and a start."""
     rows = [
         [t.block, f"{t.rate:.4g}", t.way, f"{1e9 * t.seconds:.0f}", f"{1e9 * t.least:.0f}", f"{t.ratio:.3g}"]
         for t in result.timings
@@ -205,9 +211,11 @@ def tables(result: Speed) -> list[Table]:
     ]
     system_columns = ["system", "of", "rate (Hz)", "simulated (s)", "took (s)", "times real time"]
     starts = [[s.command, f"{1e3 * s.seconds:.0f}", f"{1e3 * s.least:.0f}"] for s in result.starts]
+    isolation = [[i.fmus, f"{1e6 * i.seconds:.1f}", f"{1e6 * i.least:.1f}"] for i in result.isolation]
     made = (
         Table(columns, rows),
         Table(system_columns, systems),
+        Table(["native FMUs", "of a component and step (us)", "least (us)"], isolation),
         Table(["start", "processor time (ms)", "least (ms)"], starts),
     )
     return [table for table in made if table.rows]

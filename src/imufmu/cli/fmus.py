@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from ..cosim.errors import STEP_TIMEOUT
 from ..scoring.table import Table
 from .console import out, print_table, progress_bar
 
@@ -47,7 +48,12 @@ def build(
         out.print(str(path))
 
 
-def doctor(fmu: Annotated[Path, typer.Argument(help="An .fmu file")]) -> None:
+def doctor(
+    fmu: Annotated[Path, typer.Argument(help="An .fmu file")],
+    step_timeout: Annotated[
+        float, typer.Option("--step-timeout", min=0.001, help="Seconds that its one step may take.")
+    ] = STEP_TIMEOUT,
+) -> None:
     """Say whether and where an FMU will run, and try one step of it. Exit code 1 if something is wrong.
 
     \b
@@ -55,7 +61,7 @@ def doctor(fmu: Annotated[Path, typer.Argument(help="An .fmu file")]) -> None:
     """
     from ..fmi.doctor import Level, examine
 
-    findings = examine(fmu)
+    findings = examine(fmu, step_timeout)
     print_table(Table(["", "what", "finding"], [[f.level.value, f.topic, f.text] for f in findings], words=True))
     if any(finding.level is Level.PROBLEM for finding in findings):
         raise typer.Exit(1)

@@ -9,6 +9,7 @@ import typer
 
 from .. import __version__
 from ..cosim.errors import SimulationError
+from ..cosim.interrupt import clean_up_when_asked_to_end
 from .console import err, out
 from .fmus import build, doctor, info
 from .runs import demo, pack, replay, run
@@ -74,6 +75,7 @@ for verb in (build, doctor, info, run, replay, pack, demo, validate, benchmark, 
 
 def main() -> None:
     """Entry point: errors of the user become one line, never a stack trace."""
+    clean_up_when_asked_to_end()
     try:
         app()
     except KeyboardInterrupt:

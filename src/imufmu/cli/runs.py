@@ -7,8 +7,10 @@ from typing import Annotated
 
 import typer
 
+from ..cosim.errors import STEP_TIMEOUT
 from .arguments import check_target, parsed_sets
 from .console import notes, out, print_table, progress_bar, written
+from .saving import kept, save
 
 Sets = Annotated[
     list[str] | None,
@@ -16,6 +18,14 @@ Sets = Annotated[
 ]
 Output = Annotated[Path | None, typer.Option("--output", "-o", help="Write the results to this .csv or .h5 file.")]
 Native = Annotated[bool, typer.Option("--native", help="Our blocks as compiled C instead of Python.")]
+InProcess = Annotated[
+    bool,
+    typer.Option("--in-process", help="Let FMUs of others share this process: faster, but a crash takes all along."),
+]
+StepTimeout = Annotated[
+    float,
+    typer.Option("--step-timeout", min=0.001, help="Seconds that an FMU of others may take to answer a call."),
+]
 Plot = Annotated[bool, typer.Option("--plot", help="Write a figure next to the working folder's other files.")]
 
 
@@ -28,6 +38,8 @@ def run(
         bool, typer.Option("--jacobi", help="Take all inputs before the step, as simple masters do.")
     ] = False,
     native: Native = False,
+    in_process: InProcess = False,
+    step_timeout: StepTimeout = STEP_TIMEOUT,
     output: Output = None,
     plot: Plot = False,
     report: Annotated[Path | None, typer.Option("--report", help="Write an HTML report to this file.")] = None,
@@ -46,7 +58,8 @@ def run(
 
     The heading counts from East: an estimator without a magnetometer keeps what it does not know at the start.
     With --report or --animate the results also hold the points of the body, where the plant has the local variable
-    skeleton.
+    skeleton. An FMU that imufmu has not built runs in a process of its own: if it crashes or hangs, the run ends, and
+    the rows up to there are written, marked as partial.
     """
     from ..cosim.master import simulate
     from ..cosim.system import System, locate
@@ -58,7 +71,7 @@ def run(
     check_target(animation, ".gif", ".mp4")
     read = System.read(locate(system), native=native)
     check_pictures(read, plot, report, animation)
-    with progress_bar(f"running {read.description.name}") as progress:
+    with kept(output), progress_bar(f"running {read.description.name}") as progress:
         result = simulate(
             read,
             stop_time=stop,
@@ -66,17 +79,21 @@ def run(
             parameters=parsed_sets(sets),
             record=recorded(read) if report or animation else None,
             jacobi=jacobi,
+            in_process=in_process,
+            step_timeout=step_timeout,
             progress=progress,
         )
+    save(result, output)
     figure = Path(f"{read.description.name}.png") if plot else None
     notes(result.notes)
-    print_table(present_run(result, figure, report))
-    if output:
-        (result.to_csv if output.suffix.lower() == ".csv" else result.to_hdf5)(output)
+    table, not_compared, pictures = present_run(result, figure, report)
+    notes(not_compared)
+    print_table(table)
+    written(output, *pictures)
     if animation:
         with progress_bar(f"drawing {animation.name}") as progress:
             notes(animate(result, animation, progress))
-    written(output, figure, report, animation)
+        written(animation)
 
 
 def replay(
@@ -87,6 +104,8 @@ def replay(
     sets: Sets = None,
     native: Native = False,
     output: Output = None,
+    in_process: InProcess = False,
+    step_timeout: StepTimeout = STEP_TIMEOUT,
     local_variables: Annotated[bool, typer.Option("--locals", help="Also write the FMU's local variables.")] = False,
     plot: Plot = False,
 ) -> None:
@@ -107,19 +126,22 @@ def replay(
 
     check_target(output, ".csv")
     read_recording = read(recording)
-    with progress_bar(f"replaying {read_recording.name}") as progress:
+    with kept(output), progress_bar(f"replaying {read_recording.name}") as progress:
         result = replay_recording(
             read_recording,
             estimator_fmu(estimator, native=native),
             parsed_sets(sets),
             local_variables=local_variables,
+            in_process=in_process,
+            step_timeout=step_timeout,
             progress=progress,
         )
+    save(result, output)
     figure = Path(f"{read_recording.name}_{result.estimator}.png") if plot else None
     notes(result.notes)
-    print_table(present_replay(result, figure))
-    if output:
-        result.to_csv(output)
+    table, not_compared = present_replay(result, figure)
+    notes(not_compared)
+    print_table(table)
     written(output, figure)
 
 

@@ -1,5 +1,16 @@
-"""What can go wrong in a run; in a module of its own that loads nothing."""
+"""How a run fails, and how long it waits before it does."""
+
+from __future__ import annotations
+
+from typing import Any
+
+STEP_TIMEOUT = 60.0  # s, for each call of an FMU in a process of its own
 
 
 class SimulationError(RuntimeError):
-    """A run cannot go on; the message names component, call, time and what the FMU said."""
+    """A run cannot go on; the message names component, call, time and what the FMU said.
+
+    result: the rows up to there, a Result or a Replay marked as partial; None where there is no row yet.
+    """
+
+    result: Any = None

@@ -33,11 +33,25 @@ class Exchange:
             for variable in sorted(some, key=lambda v: v.causality != "output"):
                 self._variables[representation(variable)].append((name, variable))
         self.values = {kind: np.zeros(len(some), DTYPES[kind]) for kind, some in self._variables.items()}
+        self.rows = 0  # recorded
         self._place = {
             (component, variable.name): (kind, i)
             for kind, some in self._variables.items()
             for i, (component, variable) in enumerate(some)
         }
+        self._begin()
+
+    def _begin(self) -> None:
+        """Values before the first exchange, read by the broken end of a loop: the start of the output, or the input."""
+        for link in self._links:
+            start = link.target[1].start
+            if start is not None and link.factor:
+                kind, place = self._place[link.source[0], link.source[1].name]
+                self.values[kind][place] = (_number(start) - link.offset) / link.factor
+        for kind, place in self._place.values():
+            start = self._variables[kind][place][1].start
+            if start is not None:
+                self.values[kind][place] = _number(start)
 
     def outlets(self, component: str) -> list[Outlet]:
         """What a component reads."""
@@ -72,21 +86,29 @@ class Exchange:
             for kind in self.values
         }
         self._tables = {kind: np.empty((rows, len(some)), DTYPES[kind]) for kind, some in self._sources.items()}
+        self.rows = 0
 
     def record(self, row: int) -> None:
         """Copy the present values into a row."""
         for kind, table in self._tables.items():
             self.values[kind].take(self._sources[kind], out=table[row], mode="clip")
+        self.rows = row + 1
 
     def columns(self) -> dict[str, np.ndarray]:
-        """Recorded variables by ``component.variable``."""
-        by_kind = {kind: iter(np.ascontiguousarray(table.T)) for kind, table in self._tables.items()}
+        """Recorded variables by ``component.variable``, as far as rows were recorded."""
+        by_kind = {kind: iter(np.ascontiguousarray(table[: self.rows].T)) for kind, table in self._tables.items()}
         return {f"{c}.{v}": next(by_kind[self._place[c, v][0]]) for c, v in self._recorded}
 
     def units(self) -> dict[str, str | None]:
         """Units by ``component.variable``."""
         every = [pair for some in self._variables.values() for pair in some]
         return {f"{component}.{variable.name}": unit_of(variable) for component, variable in every}
+
+
+def _number(start: Any) -> float:
+    """A start value, which fmpy leaves as text."""
+    text = str(start).strip()
+    return float(text == "true") if text in ("true", "false") else float(text)
 
 
 def _outputs(system: System) -> list[Name]:

@@ -14,8 +14,6 @@ Jacobi takes all inputs before the tick instead, so every connection from a samp
 from __future__ import annotations
 
 import math
-import re
-import tempfile
 import time as clock
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
@@ -25,19 +23,17 @@ from typing import Any
 
 import numpy as np
 
-from ..fmi.archive import open_fmu
-from .errors import SimulationError
+from .apart import Instance, Instances
+from .errors import STEP_TIMEOUT, SimulationError
 from .exchange import Exchange
-from .interrupt import interrupt_between_calls
+from .interrupt import Terminated, interrupt_between_calls
 from .order import signal_flow
 from .results import Result
 from .settings import Setting
-from .slave import Slave, forget_paths
 from .system import Part, System, locate
 
 MOST_TICKS = 10**8  # more is taken for a wrong unit
 _BETWEEN_PROGRESS = 0.1  # s
-_PLAIN_PATH = re.compile(r"[A-Za-z0-9_.\-~ /\\:]*")  # FMUs get it as a URI, and some decode no more than spaces
 
 Progress = Callable[[int, int], None]
 
@@ -65,6 +61,8 @@ def simulate(
     record: Sequence[str] | None = None,
     jacobi: bool = False,
     native: bool = False,
+    in_process: bool = False,
+    step_timeout: float = STEP_TIMEOUT,
     progress: Progress | None = None,
 ) -> Result:
     """Run a system: a System, a file (.ssd, .ssp), or the name of a system of imufmu.
@@ -73,8 +71,13 @@ def simulate(
     parameters: start values by ``component.variable``, a vector by its name. record: names of variables or vectors
     (default: all outputs). native: as in System.read. progress(done, total), in ticks, is called now and then.
 
+    FMUs that imufmu has not built run in a process each, and may crash or hang there. in_process: let them share ours,
+    which is faster and can be debugged, and which they may take along. step_timeout: s, how long such an FMU may take
+    for a call.
+
     Raises WiringError and what System.read raises for a system that does not fit, ValueError for impossible times,
-    SimulationError for a run that fails. Whatever happens, no instance and no temporary file stays behind.
+    SimulationError for a run that fails. That, and KeyboardInterrupt, has the rows up to there as ``result``, where
+    there are any. Whatever happens, no instance, no process and no temporary file stays behind.
     """
     if not isinstance(system, System):
         system = System.read(locate(system), native=native)
@@ -83,17 +86,32 @@ def simulate(
     exchange = Exchange(system, record)
     schedule = _Schedule(system, jacobi)
     notes = [*system.notes, *_period_notes(system, settings, ticks.h), *schedule.notes]
-    with ExitStack() as stack:
-        check = stack.enter_context(interrupt_between_calls())
-        slaves = _start(system.parts, stack)
-        for name, slave in slaves.items():
-            slave.connect(exchange.outlets(name), exchange.inlets(name))
-        notes += _initialise(slaves, schedule, exchange, settings, ticks.start)
-        exchange.new_tables(ticks.count + 1)
-        _run(slaves, schedule, exchange, ticks, check, progress)
-        notes += [note for slave in slaves.values() for note in slave.notes]
-    time = ticks.start + np.arange(ticks.count + 1) * ticks.h
-    return Result(system.description.name, time, exchange.columns(), exchange.units(), tuple(notes))
+
+    def result(partial: str = "") -> Result:
+        time = ticks.start + np.arange(exchange.rows) * ticks.h
+        return Result(system.description.name, time, exchange.columns(), exchange.units(), tuple(notes), partial)
+
+    try:
+        with ExitStack() as stack:
+            check = stack.enter_context(interrupt_between_calls())
+            slaves = _start(system.parts, Instances(stack, in_process, step_timeout, check))
+            for name, slave in slaves.items():
+                slave.connect(exchange.outlets(name), exchange.inlets(name))
+            for slave in slaves.values():
+                slave.ready()
+            notes += _initialise(slaves, schedule, exchange, settings, ticks.start)
+            exchange.new_tables(ticks.count + 1)
+            _run(slaves, schedule, exchange, ticks, check, progress)
+            for slave in slaves.values():
+                notes += slave.notes
+            for slave in slaves.values():
+                slave.close()
+    except (SimulationError, KeyboardInterrupt, Terminated) as error:
+        if exchange.rows:
+            reason = str(error) if isinstance(error, SimulationError) else "interrupted"
+            error.result = result(f"{exchange.rows} of {ticks.count + 1} rows: {reason}")  # type: ignore[union-attr]
+        raise
+    return result()
 
 
 def _ticks(system: System, start: float | None, stop: float | None, h: float | None) -> Ticks:
@@ -156,27 +174,13 @@ def _period_notes(system: System, settings: Sequence[Setting], h: float) -> list
     return notes
 
 
-def _start(parts: Sequence[Part], stack: ExitStack) -> dict[str, Slave]:
-    """Instances of all components, by name; the stack closes them and deletes what was unpacked."""
-    scratch = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="imufmu_run_", ignore_cleanup_errors=True)))
-    if not _PLAIN_PATH.fullmatch(str(scratch)):
-        raise SimulationError(f"FMUs do not understand the path {scratch}; let TMPDIR name a folder in plain letters")
-    stack.callback(forget_paths, scratch)
-    unpacked: dict[Path, tuple[Path, Path]] = {}
-    slaves = {}
-    for part in parts:
-        if part.fmu not in unpacked:
-            folder = scratch / str(len(unpacked))
-            folder.mkdir()
-            unpacked[part.fmu] = (open_fmu(part.fmu, folder)[0], folder)
-        slave = Slave(part.name, *unpacked[part.fmu], part.model)
-        stack.callback(slave.close)
-        slaves[part.name] = slave
-    return slaves
+def _start(parts: Sequence[Part], instances: Instances) -> dict[str, Instance]:
+    """Instances of all components, by name."""
+    return {part.name: instances.start(part.name, part.fmu, part.model, part.ours) for part in parts}
 
 
 def _initialise(
-    slaves: Mapping[str, Slave], schedule: _Schedule, exchange: Exchange, settings: Sequence[Setting], time: float
+    slaves: Mapping[str, Instance], schedule: _Schedule, exchange: Exchange, settings: Sequence[Setting], time: float
 ) -> list[str]:
     """Start values, then outputs exchanged until they settle."""
     for name, slave in slaves.items():
@@ -198,7 +202,7 @@ def _initialise(
 
 
 def _run(
-    slaves: Mapping[str, Slave],
+    slaves: Mapping[str, Instance],
     schedule: _Schedule,
     exchange: Exchange,
     ticks: Ticks,
@@ -226,9 +230,7 @@ def _run(
     exchange.record(ticks.count)
 
 
-def _advance(slave: Slave, t: float, h: float, reached: float, gather: bool) -> None:
+def _advance(slave: Instance, t: float, h: float, reached: float, gather: bool) -> None:
     if gather:
         slave.gather()
-    slave.write(t)
-    slave.step(t, h)
-    slave.read(reached)
+    slave.advance(t, h, reached)

@@ -7,6 +7,7 @@ it tells instances apart by the environment that they were given, and prints wha
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Callable
 from ctypes import byref
 from itertools import count
 from typing import Any
@@ -30,9 +31,13 @@ _listening: dict[int, Messages] = {}
 
 
 class Messages:
-    """The messages of one FMU instance. ``callbacks`` is what the instance must be given; call ``close`` in the end."""
+    """The messages of one FMU instance. ``callbacks`` is what the instance must be given; call ``close`` in the end.
 
-    def __init__(self) -> None:
+    say: called with what is the latest after each message.
+    """
+
+    def __init__(self, say: Callable[[str], None] | None = None) -> None:
+        self._say = say
         self._environment = next(_environments)
         self._complaints: deque[str] = deque(maxlen=_LATEST)
         self._remarks: deque[str] = deque(maxlen=_LATEST)
@@ -57,6 +62,8 @@ class Messages:
         (self._remarks if status == fmi2OK else self._complaints).append(text)
         if status != fmi2OK and len(self._warnings) < _MOST_WARNINGS:
             self._warnings[text] = None
+        if self._say:
+            self._say(self.latest)
 
     @property
     def warnings(self) -> list[str]:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import tempfile
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -12,15 +12,19 @@ import numpy as np
 
 from ..blocks.vocabulary import ACCEL, GYRO, MAG
 from ..files.csv_table import write_csv
-from ..fmi.archive import open_fmu
+from ..fmi.archive import read_fmu
 from ..fmi.build import cached_fmu
 from ..fmi.native import cached_native_fmu
+from ..fmi.own import is_ours
 from ..recordings.reading import Recording, hold_missing
 from ..registry import BLOCKS, ESTIMATORS
+from .apart import Instance, Instances
+from .errors import STEP_TIMEOUT, SimulationError
 from .interface import Interface, WiringError, unit_of
-from .interrupt import interrupt_between_calls
+from .interrupt import Terminated, interrupt_between_calls
+from .results import partial_remark
 from .settings import Setting, given_settings
-from .slave import Inlet, Outlet, Slave, forget_paths
+from .slave import Inlet, Outlet
 
 _READINGS = {signal.name: signal for signal in (GYRO, ACCEL, MAG)}
 _BETWEEN_PROGRESS = 1000  # samples
@@ -32,7 +36,8 @@ class Replay:
     """Outputs of an estimator over a recording, one row per row of the file.
 
     estimator: its name. columns: (n,) by FMU variable name, in the order of the FMU. units: by variable name. notes:
-    what a user should know.
+    what a user should know. partial: empty for a replay that reached the end of the file; else how far it came and why
+    it ended, with columns of less rows than the file has.
     """
 
     recording: Recording
@@ -40,6 +45,7 @@ class Replay:
     columns: dict[str, np.ndarray]
     units: dict[str, str]
     notes: tuple[str, ...]
+    partial: str = ""
 
     def signals(self) -> dict[str, np.ndarray]:
         """Columns as signals: roll (n,), vertical (n, 3), ..."""
@@ -50,8 +56,9 @@ class Replay:
         return {name: np.column_stack(part) if name in vectors else part[0] for name, part in parts.items()}
 
     def to_csv(self, path: Path) -> None:
-        """Write time and all columns. Raises WriteError."""
-        write_csv(path, {"time": self.recording.time, **self.columns})
+        """Write time and all columns; where they are partial a last line says so, behind a #. Raises WriteError."""
+        rows = min((len(column) for column in self.columns.values()), default=len(self.recording.time))
+        write_csv(path, {"time": self.recording.time[:rows], **self.columns}, partial_remark(self.partial))
 
 
 def estimator_fmu(name: str, *, native: bool = False) -> Path:
@@ -70,82 +77,102 @@ def replay(
     parameters: Mapping[str, Any] | None = None,
     *,
     local_variables: bool = False,
+    in_process: bool = False,
+    step_timeout: float = STEP_TIMEOUT,
     progress: Callable[[int, int], None] | None = None,
 ) -> Replay:
     """Run the recording through an FMU whose inputs are gyro and accel (and mag), [1] to [3] each.
 
     parameters: start values by variable name; ``sample_period`` follows the recording. Samples the recording lacks are
     given as NaN to an FMU that reports a ``status``, and are held for any other. local_variables: also return those.
+    in_process, step_timeout: as for ``simulate``.
 
-    Raises ArchiveError, WiringError (the FMU or a parameter does not fit) and SimulationError.
+    Raises ArchiveError, WiringError (the FMU or a parameter does not fit) and SimulationError. That, and
+    KeyboardInterrupt, has the rows up to there as ``result``, where there are any.
     """
-    with tempfile.TemporaryDirectory(prefix="imufmu_replay_", ignore_cleanup_errors=True) as folder:
-        library, model = open_fmu(fmu, Path(folder))
-        interface = Interface(model.modelName, {v.name: v for v in model.modelVariables})
-        used, readings, notes = _inputs(interface, recording, fmu)
-        settings = _settings(interface, recording, dict(parameters or {}), fmu)
-        outputs = [v for v in interface.of("output") if v.type == "Real"]
-        reported = outputs + [v for v in interface.of("local") if v.type == "Real" and local_variables]
-        now, values = np.empty(len(used)), np.empty(len(reported))
-        with interrupt_between_calls() as check:
-            slave = Slave(interface.component, library, Path(folder), model)
-            try:
-                sources = np.arange(len(used))
-                inlet = Inlet("Real", used, now, sources, np.ones(len(used)), np.zeros(len(used)))
-                slave.connect([Outlet("Real", reported, len(outputs), values)], [inlet])
-                clock = (float(recording.time[0]), recording.sample_period)
-                rows = _run(slave, settings, clock, readings, now, values, check, progress)
-                notes += slave.notes
-            finally:
-                slave.close()
-                forget_paths(Path(folder))
-    at_rows = rows[recording.sample_index]
-    return Replay(
-        recording,
-        interface.component,
-        {v.name: at_rows[:, i] for i, v in enumerate(reported)},
-        {v.name: unit_of(v) or "" for v in reported},
-        (*recording.notes, *notes),
-    )
+    model = read_fmu(fmu)
+    interface = Interface(model.modelName, {v.name: v for v in model.modelVariables})
+    used, readings, notes = _inputs(interface, recording, fmu)
+    settings = _settings(interface, recording, dict(parameters or {}), fmu)
+    outputs = [v for v in interface.of("output") if v.type == "Real"]
+    reported = outputs + [v for v in interface.of("local") if v.type == "Real" and local_variables]
+    run = _Run(readings, float(recording.time[0]), recording.sample_period, len(reported))
+
+    def result(partial: str = "") -> Replay:
+        rows = np.searchsorted(recording.sample_index, run.done)
+        at_rows = run.rows[recording.sample_index[:rows]]
+        return Replay(
+            recording,
+            interface.component,
+            {v.name: at_rows[:, i] for i, v in enumerate(reported)},
+            {v.name: unit_of(v) or "" for v in reported},
+            (*recording.notes, *notes),
+            f"{rows} of {len(recording.time)} rows: {partial}" if partial else "",
+        )
+
+    try:
+        with ExitStack() as stack:
+            check = stack.enter_context(interrupt_between_calls())
+            instances = Instances(stack, in_process, step_timeout, check)
+            slave = instances.start(interface.component, fmu, model, is_ours(fmu))
+            sources = np.arange(len(used))
+            inlet = Inlet("Real", used, run.now, sources, np.ones(len(used)), np.zeros(len(used)))
+            slave.connect([Outlet("Real", reported, len(outputs), run.values)], [inlet])
+            slave.ready()
+            run(slave, settings, check, progress)
+            notes += slave.notes
+            slave.close()
+    except (SimulationError, KeyboardInterrupt, Terminated) as error:
+        if run.done:
+            reason = str(error) if isinstance(error, SimulationError) else "interrupted"
+            error.result = result(reason)  # type: ignore[union-attr]
+        raise
+    return result()
 
 
-def _run(
-    slave: Slave,
-    settings: tuple[Setting, ...],
-    clock: tuple[float, float],
-    readings: np.ndarray,
-    now: np.ndarray,
-    values: np.ndarray,
-    check: Callable[[], None],
-    progress: Callable[[int, int], None] | None,
-) -> np.ndarray:
-    """Values of the FMU after every row of readings; clock: start time and sample period (s)."""
-    start, period = clock
-    rows = np.empty((len(readings), len(values)))
-    slave.enter_initialisation(settings, start)
-    now[:] = readings[0]
-    slave.gather()
-    slave.write(start)
-    slave.exit_initialisation(start)
-    for k, row in enumerate(readings):
-        check()
-        time = start + k * period
-        now[:] = row
+class _Run:
+    """All samples of a recording through one instance.
+
+    readings: (n, inputs), one row per sample. start, period: s. rows: (n, outputs), of which ``done`` are filled.
+    """
+
+    def __init__(self, readings: np.ndarray, start: float, period: float, outputs: int) -> None:
+        self._readings, self._start, self._period = readings, start, period
+        self.now, self.values = np.empty(readings.shape[1]), np.empty(outputs)
+        self.rows = np.empty((len(readings), outputs))
+        self.done = 0
+
+    def __call__(
+        self,
+        slave: Instance,
+        settings: tuple[Setting, ...],
+        check: Callable[[], None],
+        progress: Callable[[int, int], None] | None,
+    ) -> None:
+        start, period = self._start, self._period
+        slave.enter_initialisation(settings, start)
+        self.now[:] = self._readings[0]
         slave.gather()
-        slave.write(time)
-        slave.step(time, period)
-        slave.read(time)
-        rows[k] = values
-        if progress and k % _BETWEEN_PROGRESS == 0:
-            progress(k, len(readings))
-    return rows
+        slave.write(start)
+        slave.exit_initialisation(start)
+        for k, row in enumerate(self._readings):
+            check()
+            time = start + k * period
+            self.now[:] = row
+            slave.gather()
+            slave.advance(time, period, time)
+            self.rows[k] = self.values
+            self.done = k + 1
+            if progress and k % _BETWEEN_PROGRESS == 0:
+                progress(k, len(self._readings))
 
 
 def _inputs(interface: Interface, recording: Recording, fmu: Path) -> tuple[list[Any], np.ndarray, list[str]]:
     """Input variables of the FMU that the recording feeds, their values at every instant, and notes."""
-    problems, notes, used, columns = [], [], [], []
+    notes: list[str] = []
+    problems, used, columns = [], [], []
     instants = recording.at_instants()
-    inputs = {v.name: v for v in interface.of("input")}
+    inputs = _from_one(interface.of("input"), notes)
     for name, signal in _READINGS.items():
         wanted = [element for element in signal.element_names() if element in inputs]
         if not wanted and name in instants:
@@ -165,7 +192,7 @@ def _inputs(interface: Interface, recording: Recording, fmu: Path) -> tuple[list
             columns.append(instants[name][:, i])
     if problems:
         raise WiringError(fmu, problems, f"cannot replay {recording.path}")
-    free = [name for name in inputs if name not in {v.name for v in used}]
+    free = [variable.name for variable in inputs.values() if variable not in used]
     if free:
         notes.append(f"inputs not in the recording stay at their start values: {', '.join(free)}")
     readings = np.column_stack(columns)
@@ -174,6 +201,17 @@ def _inputs(interface: Interface, recording: Recording, fmu: Path) -> tuple[list
         readings = hold_missing(readings)
         notes.append(f"{missing.sum()} of {len(readings)} samples are incomplete; held, as the FMU has no status")
     return used, readings, notes
+
+
+def _from_one(inputs: Sequence[Any], notes: list[str]) -> dict[str, Any]:
+    """Inputs by name; those of a reading whose FMU counts from 0 by the names of the same axes that count from 1."""
+    names = {variable.name: variable for variable in inputs}
+    for reading in _READINGS:
+        if f"{reading}[0]" in names:
+            axes = [names.pop(f"{reading}[{i}]", None) for i in range(3)]
+            names |= {f"{reading}[{i}]": axis for i, axis in enumerate(axes, 1) if axis is not None}
+            notes.append(f"inputs {reading}[0], [1], [2] count from 0: taken for the axes x, y, z")
+    return names
 
 
 def _settings(interface: Interface, recording: Recording, parameters: dict[str, Any], fmu: Path) -> tuple[Setting, ...]:

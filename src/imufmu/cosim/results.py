@@ -27,6 +27,7 @@ class Result:
 
     system: its name. time: (n,), s. columns: (n,) by ``component.variable``, float64, or int32 for Integer and Boolean
     variables. units: by the same names; None where the FMU does not say. notes: what a user should know about the run.
+    partial: empty for a run that reached its end; else how far it came and why it ended.
 
     A row holds the values of its time; outputs of sampled FMUs are those of the sample taken then (the last row: held).
     """
@@ -36,6 +37,7 @@ class Result:
     columns: Mapping[str, np.ndarray]
     units: Mapping[str, str | None]
     notes: tuple[str, ...] = ()
+    partial: str = ""
 
     @property
     def names(self) -> list[str]:
@@ -80,17 +82,23 @@ class Result:
         return table
 
     def to_csv(self, path: str | Path) -> None:
-        """Write a table with one header line (``time`` and the columns) that holds every number exactly."""
-        write_csv(path, {"time": self.time, **self.columns})
+        """Write a table with one header line (``time`` and the columns) that holds every number exactly.
+
+        A partial result has a last line that says so, behind a #.
+        """
+        write_csv(path, {"time": self.time, **self.columns}, partial_remark(self.partial))
 
     def to_hdf5(self, path: str | Path) -> None:
         """Write ``/time`` and one dataset per variable, ``/component/variable``; a vector is one dataset (n, k).
 
-        Each dataset has the attribute ``unit`` where the FMU names one; the file has ``system`` and ``notes``.
+        Each dataset has the attribute ``unit`` where the FMU names one; the file has ``system`` and ``notes``, and
+        ``partial`` where the result is.
         """
         with atomic_write(path) as temporary, h5py.File(temporary, "w", track_order=True) as file:
             file.attrs["system"] = self.system
             file.attrs["notes"] = list(self.notes)
+            if self.partial:
+                file.attrs["partial"] = self.partial
             file.create_dataset("time", data=self.time).attrs["unit"] = "s"
             for name, first in self._datasets():
                 dataset = file.create_dataset(name.replace(".", "/", 1), data=self[name], track_order=True)
@@ -106,6 +114,11 @@ class Result:
             if name not in written:
                 written.add(name)
                 yield name, column
+
+
+def partial_remark(partial: str) -> str:
+    """What a table says of rows that are not all; empty for those that are."""
+    return f"partial: {partial}" if partial else ""
 
 
 def read_hdf5(path: str | Path) -> Result:
@@ -126,7 +139,8 @@ def read_hdf5(path: str | Path) -> Result:
         with h5py.File(path, "r", track_order=True) as file:
             time = file["time"][()]
             file.visititems(take)
-            return Result(str(file.attrs["system"]), time, columns, units, tuple(map(str, file.attrs["notes"])))
+            notes = tuple(map(str, file.attrs["notes"]))
+            return Result(str(file.attrs["system"]), time, columns, units, notes, str(file.attrs.get("partial", "")))
     except (OSError, KeyError, IndexError, AttributeError) as error:
         raise ValueError(f"{path}: cannot be read as a result: {error}") from error
 

@@ -75,7 +75,7 @@ def _checked(
         if component not in interfaces:
             problems.append(f"{start}: there is no component {component!r}; there is {', '.join(interfaces)}")
             continue
-        settable = {v.name: v for v in interfaces[component].of("parameter", "input")}
+        settable = {v.name: v for v in interfaces[component].variables.values() if _is_settable(v)}
         if given.name not in settable:
             problems.append(f"{start}: no parameter of its FMU. Near: {near(given.name, settable)}")
             continue
@@ -86,6 +86,12 @@ def _checked(
         else:
             settings.append(Setting(component, variable, _parsed(given, variable)))
     return merged(settings)
+
+
+def _is_settable(variable: Any) -> bool:
+    """Whether FMI lets it be set before initialisation: parameters, inputs, and what has a start value of its own."""
+    own_start = variable.initial in ("exact", "approx") and variable.variability != "constant"
+    return variable.causality in ("parameter", "input") or (own_start and variable.causality in ("output", "local"))
 
 
 def _misfit(given: ParameterValue, variable: Any) -> str:

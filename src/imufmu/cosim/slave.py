@@ -10,25 +10,54 @@ import importlib
 import os
 import sys
 from collections.abc import Callable, Sequence
-from contextlib import suppress
-from ctypes import POINTER, c_double, c_int, c_uint
+from ctypes import POINTER, c_char_p, c_double, c_int, c_uint
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from fmpy.fmi1 import FMICallException
-from fmpy.fmi2 import FMU2Slave, fmi2Discard, fmi2Fatal, fmi2True, fmi2Warning
+from fmpy.fmi2 import FMU2Slave, fmi2Discard, fmi2Fatal, fmi2OK, fmi2True, fmi2Warning
 
 from .errors import SimulationError
 from .messages import Messages
-from .settings import Setting
+
+if TYPE_CHECKING:
+    from .settings import Setting
 
 DTYPES: dict[str, Any] = {"Real": np.float64, "Integer": np.int32, "Boolean": np.int32}
 _POINTERS: dict[str, Any] = {"Real": POINTER(c_double), "Integer": POINTER(c_int), "Boolean": POINTER(c_int)}
+_KINDS = {float: "Real", bool: "Boolean", int: "Integer"}
+_GOOD = (fmi2OK, fmi2Warning)
 
-_Call = tuple[str, Callable[[], int]]  # name of an FMI function, and a call of it
+# Everything that may crash or hang, by number, so that another process can be told what is going on.
+CALLS = (
+    "start",
+    "load of its script",
+    "load of its binary",
+    "fmi2Instantiate",
+    *(f"fmi2{verb}{kind}" for verb in ("Set", "Get") for kind in (*DTYPES, "String")),
+    "fmi2SetupExperiment",
+    "fmi2EnterInitializationMode",
+    "fmi2ExitInitializationMode",
+    "fmi2DoStep",
+    "fmi2Terminate",
+    "fmi2FreeInstance",
+)
+DO_STEP = CALLS.index("fmi2DoStep")
+
+_Call = tuple[int, Callable[[], int]]  # number of an FMI function, and a call of it
+
+
+@dataclass(frozen=True)
+class Unpacked:
+    """An FMU on disk: its shared library, the folder it is unpacked in, its GUID and modelIdentifier."""
+
+    library: Path
+    folder: Path
+    guid: str
+    identifier: str
 
 
 @dataclass(frozen=True)
@@ -53,49 +82,62 @@ class Inlet:
     offset: np.ndarray
 
 
+class Inputs:
+    """The inputs of a component, gathered from the values of their sources into one buffer per inlet."""
+
+    def __init__(self, inlets: Sequence[Inlet], buffers: Sequence[np.ndarray]) -> None:
+        as_they_are = [bool(np.all(inlet.factor == 1.0) and np.all(inlet.offset == 0.0)) for inlet in inlets]
+        self._each = list(zip(inlets, buffers, as_they_are, strict=True))
+
+    def gather(self) -> None:
+        """Take the inputs from the present values of their sources."""
+        for inlet, buffer, as_it_is in self._each:
+            inlet.pool.take(inlet.sources, out=buffer, mode="clip")
+            if not as_it_is:
+                buffer *= inlet.factor
+                buffer += inlet.offset
+
+
 class Slave:
     """An FMU instance, from instantiation to ``close``. Every failure is a SimulationError.
 
-    library, folder: its shared library, and where the FMU is unpacked. model: its ModelDescription (fmpy).
+    now: gets the number, in CALLS, of each call before it is made. say: called with what the FMU logs.
     """
 
-    def __init__(self, name: str, library: Path, folder: Path, model: Any) -> None:
+    def __init__(self, name: str, fmu: Unpacked, now: Any = None, say: Callable[[str], None] | None = None) -> None:
         self.name = name
-        self._messages = Messages()
-        self._may_terminate = self._lost = False
-        self._instance: Any = None
-        _import_script(name, folder)
-        folder_before = os.getcwd()
+        self.messages = Messages(say)
+        self._now = c_int() if now is None else now
+        self._may_terminate = self._lost = self._closed = False
+        self._now.value = CALLS.index("load of its script")
         try:
-            self._fmu = FMU2Slave(
-                guid=model.guid,
-                modelIdentifier=model.coSimulation.modelIdentifier,
-                unzipDirectory=str(folder),
-                instanceName=name,
-                libraryPath=str(library),
-            )
-        except Exception as error:  # fmpy raises plain exceptions, and AttributeError for a missing function
-            os.chdir(folder_before)  # fmpy loads libraries in their folder, and stays there when that fails
-            self._messages.close()
-            raise SimulationError(f"{name}: its binary cannot be loaded: {error}") from error
+            _import_script(name, fmu.folder)
+            self._now.value = CALLS.index("load of its binary")
+            self._fmu = _loaded(name, fmu)
+        except SimulationError:
+            self.messages.close()
+            raise
+        self._now.value = CALLS.index("fmi2Instantiate")
         try:
-            self._fmu.instantiate(callbacks=self._messages.callbacks, loggingOn=True)
-        except Exception as error:  # as above
-            said = self._messages.latest
-            self._messages.close()
+            self._fmu.instantiate(callbacks=self.messages.callbacks, loggingOn=True)
+        except Exception as error:  # fmpy raises plain exceptions
+            said = self.messages.latest
+            self.messages.close()
             self._fmu.freeLibrary()
-            raise SimulationError(f"{name}: cannot be instantiated{_quoted(said)}") from error
-        self._instance = self._fmu.component
+            raise SimulationError(f"{name}: cannot be instantiated{quoted(said)}") from error
+        self._instance: Any = self._fmu.component
         self._do_step = self._function("fmi2DoStep")
+        self._inputs = Inputs([], [])
         self._gets: list[_Call] = []
         self._initial_gets: list[_Call] = []
         self._sets: list[_Call] = []
-        self._gathers: list[tuple[Inlet, np.ndarray, bool]] = []
         self._reals: list[tuple[Outlet, np.ndarray]] = []
         self._warned = False
 
-    def connect(self, outlets: Sequence[Outlet], inlets: Sequence[Inlet]) -> None:
-        """Prepare the calls of ``read``, ``gather`` and ``write``."""
+    def connect(
+        self, outlets: Sequence[Outlet], inlets: Sequence[Inlet], buffers: Sequence[np.ndarray] | None = None
+    ) -> None:
+        """Prepare the calls of ``read``, ``gather`` and ``write``. buffers: where the inputs are gathered, by inlet."""
         for outlet in outlets:
             self._gets.append(self._call("Get", outlet.kind, outlet.variables, outlet.values))
             if outlet.outputs:
@@ -103,67 +145,67 @@ class Slave:
                 self._initial_gets.append(self._call("Get", outlet.kind, outputs, outlet.values))
             if outlet.kind == "Real":
                 self._reals.append((outlet, np.zeros(len(outlet.variables))))
-        for inlet in inlets:
-            buffer = np.zeros(len(inlet.variables), DTYPES[inlet.kind])
-            as_it_is = np.all(inlet.factor == 1.0) and np.all(inlet.offset == 0.0)
-            self._gathers.append((inlet, buffer, bool(as_it_is)))
+        if buffers is None:
+            buffers = [np.zeros(len(inlet.variables), DTYPES[inlet.kind]) for inlet in inlets]
+        self._inputs = Inputs(inlets, buffers)
+        for inlet, buffer in zip(inlets, buffers, strict=True):
             self._sets.append(self._call("Set", inlet.kind, inlet.variables, buffer))
 
     def _call(self, verb: str, kind: str, variables: Sequence[Any], values: np.ndarray) -> _Call:
         """An FMI function with all its arguments."""
         name = f"fmi2{verb}{kind}"
         references, pointer = _references(variables), values.ctypes.data_as(_POINTERS[kind])
-        return name, partial(self._function(name), self._instance, references, len(variables), pointer)
+        call = partial(self._function(name), self._instance, references, len(variables), pointer)
+        return CALLS.index(name), call
 
     def _function(self, name: str) -> Callable[..., int]:
-        """The C function, which gives its status back: FMPy's method of this name takes longer than most FMUs do."""
+        """The C function, which gives its status back: FMPy's method takes longer than most FMUs do, and passes -5."""
         function: Callable[..., int] = getattr(self._fmu.dll, name)
         return function
 
+    def ready(self) -> None:
+        """Wait until the instance is there: at once in this process."""
+
     def enter_initialisation(self, settings: Sequence[Setting], start_time: float) -> None:
         """Apply the start values and enter initialization mode."""
-        setters = {float: self._fmu.setReal, bool: self._fmu.setBoolean, int: self._fmu.setInteger}
         for setting in settings:
-            try:
-                setters.get(type(setting.value), self._fmu.setString)(
-                    [setting.variable.valueReference], [setting.value]
-                )
-            except FMICallException as error:
-                raise self._failure(error, f"{setting.variable.name} = {setting.value}") from None
-        try:
-            self._fmu.setupExperiment(startTime=start_time)
-            self._fmu.enterInitializationMode()
-        except FMICallException as error:
-            raise self._failure(error, f"t = {start_time:g} s") from None
+            variable, value = setting.variable, setting.value
+            if isinstance(value, str):
+                name, text = "fmi2SetString", (c_char_p * 1)(value.encode())
+                call = partial(self._function(name), self._instance, _references([variable]), 1, text)
+                calls: list[_Call] = [(CALLS.index(name), call)]
+            else:
+                kind = _KINDS[type(value)]
+                calls = [self._call("Set", kind, [variable], np.array([value], DTYPES[kind]))]
+            self._make(calls, f"{variable.name} = {value}")
+        at = when(start_time)
+        self._plain("fmi2SetupExperiment", at, 0, 0.0, start_time, 0, 0.0)
+        self._plain("fmi2EnterInitializationMode", at)
 
     def exit_initialisation(self, time: float) -> None:
         """Leave initialization mode: the instance can step from here on."""
-        try:
-            self._fmu.exitInitializationMode()
-        except FMICallException as error:
-            raise self._failure(error, f"t = {time:g} s") from None
+        self._plain("fmi2ExitInitializationMode", when(time))
         self._may_terminate = True
 
     def gather(self) -> None:
         """Take the inputs from the present values of their sources."""
-        for inlet, buffer, as_it_is in self._gathers:
-            inlet.pool.take(inlet.sources, out=buffer, mode="clip")
-            if not as_it_is:
-                buffer *= inlet.factor
-                buffer += inlet.offset
+        self._inputs.gather()
 
     def write(self, time: float) -> None:
         """Hand the gathered inputs to the FMU."""
         self._make(self._sets, time)
 
-    def step(self, time: float, h: float) -> None:
-        """From time to time + h."""
+    def advance(self, time: float, h: float, reached: float) -> None:
+        """Hand over the gathered inputs, step from time to time + h, get the variables: those of time ``reached``."""
+        self._make(self._sets, time)
+        self._now.value = DO_STEP
         status = self._do_step(self._instance, time, h, fmi2True)
-        if status > fmi2Warning:
-            raise self._failure(FMICallException("fmi2DoStep", status), f"t = {time:g} s, step {h:g} s")
+        if status not in _GOOD:
+            raise self._failure("fmi2DoStep", status, when(time, h))
         if status == fmi2Warning and not self._warned:
             self._warned = True
-            self._messages.add(status, f"fmi2DoStep at t = {time:g} s returned a warning")
+            self.messages.add(status, f"fmi2DoStep at {when(time)} returned a warning")
+        self.read(reached)
 
     def read(self, time: float) -> None:
         """Get the variables; none may be other than finite."""
@@ -172,40 +214,74 @@ class Slave:
             if outlet.values.dot(zeros) != 0.0:  # nan or infinity times zero is not
                 i = int(np.argmin(np.isfinite(outlet.values)))
                 raise SimulationError(
-                    f"{self.name}.{outlet.variables[i].name} = {outlet.values[i]} at t = {time:g} s"
-                    + _quoted(self._messages.latest)
+                    f"{self.name}.{outlet.variables[i].name} = {outlet.values[i]} at {when(time)}"
+                    + quoted(self.messages.latest)
                 )
 
     def read_initial(self, time: float) -> None:
         """Get the outputs during initialisation, where FMI allows no other variable."""
         self._make(self._initial_gets, time)
 
-    def _make(self, calls: Sequence[_Call], time: float) -> None:
-        for name, call in calls:
+    def _make(self, calls: Sequence[_Call], at: float | str) -> None:
+        """Make calls; at: the time, or where else a failure happened."""
+        for number, call in calls:
+            self._now.value = number
             status = call()
-            if status > fmi2Warning:
-                raise self._failure(FMICallException(name, status), f"t = {time:g} s")
+            if status not in _GOOD:
+                raise self._failure(CALLS[number], status, at if isinstance(at, str) else when(at))
+
+    def _plain(self, name: str, at: str, *arguments: Any) -> None:
+        """Make one call that has nothing prepared."""
+        self._make([(CALLS.index(name), partial(self._function(name), self._instance, *arguments))], at)
 
     @property
     def notes(self) -> list[str]:
         """What the FMU warned of."""
         own = f"{self.name}: "  # some FMUs begin their messages with their name
-        return [own + text.removeprefix(own) for text in self._messages.warnings]
+        return [own + text.removeprefix(own) for text in self.messages.warnings]
 
     def close(self) -> None:
-        """Terminate and free the instance, as far as FMI allows after what happened."""
+        """Terminate and free the instance, as far as FMI allows after what happened, and unload its library."""
+        if self._closed:
+            return
+        self.free()
         if not self._lost:
-            with suppress(FMICallException):
-                if self._may_terminate:
-                    self._fmu.terminate()
-            self._fmu.freeInstance()
-        self._messages.close()
+            self._fmu.freeLibrary()
 
-    def _failure(self, error: FMICallException, at: str) -> SimulationError:
+    abandon = close
+
+    def free(self) -> None:
+        """As ``close``, with the library left loaded: threads that the FMU has left behind may still run in it."""
+        self._closed = True
+        if not self._lost:
+            if self._may_terminate:
+                self._now.value = CALLS.index("fmi2Terminate")
+                self._function("fmi2Terminate")(self._instance)
+            self._now.value = CALLS.index("fmi2FreeInstance")
+            self._function("fmi2FreeInstance")(self._instance)
+        self.messages.close()
+
+    def _failure(self, name: str, status: int, at: str) -> SimulationError:
         """The error to raise; also remembers which calls are still allowed."""
-        self._lost = self._lost or error.status == fmi2Fatal
-        self._may_terminate = self._may_terminate and error.status == fmi2Discard
-        return SimulationError(f"{self.name}: {error.args[0].rstrip('.')} at {at}{_quoted(self._messages.latest)}")
+        error = FMICallException(name, status)
+        self._lost = self._lost or status == fmi2Fatal
+        self._may_terminate = self._may_terminate and status == fmi2Discard
+        return SimulationError(f"{self.name}: {error.args[0].rstrip('.')} at {at}{quoted(self.messages.latest)}")
+
+
+def _loaded(name: str, fmu: Unpacked) -> FMU2Slave:
+    folder_before = os.getcwd()
+    try:
+        return FMU2Slave(
+            guid=fmu.guid,
+            modelIdentifier=fmu.identifier,
+            unzipDirectory=str(fmu.folder),
+            instanceName=name,
+            libraryPath=str(fmu.library),
+        )
+    except Exception as error:  # fmpy raises plain exceptions, and AttributeError for a missing function
+        os.chdir(folder_before)  # fmpy loads libraries in their folder, and stays there when that fails
+        raise SimulationError(f"{name}: its binary cannot be loaded: {error}") from error
 
 
 def _import_script(name: str, folder: Path) -> None:
@@ -226,9 +302,15 @@ def forget_paths(folder: Path) -> None:
     sys.path[:] = [entry for entry in sys.path if not Path(entry).is_relative_to(folder)]
 
 
+def when(time: float, h: float | None = None) -> str:
+    """A time (s), or a step that begins there, for messages; exact to 0.01 ms in calendar time too."""
+    return f"t = {time:.15g} s" if h is None else f"t = {time:.15g} s, step {h:.15g} s"
+
+
+def quoted(said: str) -> str:
+    """What an FMU said, for the end of a message."""
+    return f": {said}" if said else "; the FMU gave no reason"
+
+
 def _references(variables: Sequence[Any]) -> Any:
     return (c_uint * len(variables))(*(variable.valueReference for variable in variables))
-
-
-def _quoted(said: str) -> str:
-    return f": {said}" if said else "; the FMU gave no reason"

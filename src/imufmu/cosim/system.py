@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import os
-import shutil
-import tempfile
 import weakref
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -13,9 +11,11 @@ from typing import Any
 
 from ..files.archives import ArchiveError, unpack
 from ..files.locations import models_folder
+from ..files.scratch import new_scratch
 from ..fmi.archive import read_fmu
 from ..fmi.build import cached_fmu
 from ..fmi.native import cached_native_fmu
+from ..fmi.own import is_ours
 from ..registry import BLOCKS
 from .description import Component, Description, DescriptionError, read_description
 from .interface import Interface, WiringError
@@ -27,11 +27,12 @@ STRUCTURE = "SystemStructure.ssd"  # the description inside an .ssp
 
 @dataclass(frozen=True, eq=False)
 class Part:
-    """One component: its FMU file and that FMU's ModelDescription (fmpy)."""
+    """One component: its FMU file and that FMU's ModelDescription (fmpy). ours: imufmu has built it here."""
 
     name: str
     fmu: Path
     model: Any
+    ours: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,18 +60,19 @@ class System:
         path = Path(path).resolve()
         if path.suffix.lower() != ".ssp":
             return _read(path, native)
-        folder = str(Path(tempfile.mkdtemp(prefix="imufmu_ssp_")).resolve())
+        scratch, delete = new_scratch("ssp")
+        folder = str(scratch)
         try:
             unpack(path, Path(folder))
             if not (Path(folder) / STRUCTURE).is_file():
                 raise ArchiveError(f"{path}: {STRUCTURE} is missing: this is no SSP")
             system = replace(_read(Path(folder) / STRUCTURE, native, inside=Path(folder)), path=path)
         except BaseException as error:
-            shutil.rmtree(folder, ignore_errors=True)
+            delete()
             # A user knows the archive, not the folder that it was unpacked to.
             error.args = tuple(str(part).replace(f"{folder}{os.sep}", f"{path}: ") for part in error.args)
             raise
-        weakref.finalize(system, shutil.rmtree, folder, ignore_errors=True)
+        weakref.finalize(system, delete)
         return system
 
     @property
@@ -106,10 +108,10 @@ def _read(path: Path, native: bool, inside: Path | None = None) -> System:
     models: dict[Path, Any] = {}
     parts = []
     for component in description.components:
-        fmu = _fmu_file(component, path, native)
+        fmu, ours = _fmu_file(component, path, native)
         if fmu not in models:
             models[fmu] = read_fmu(fmu)
-        parts.append(Part(component.name, fmu, models[fmu]))
+        parts.append(Part(component.name, fmu, models[fmu], ours))
     interfaces = {part.name: _interface(part) for part in parts}
     problems = _instance_problems(parts)
     notes: list[str] = []
@@ -133,12 +135,12 @@ def _check_names(description: Description) -> None:
             raise DescriptionError(f"{where}: the name occurs twice; rename one of them")
 
 
-def _fmu_file(component: Component, path: Path, native: bool) -> Path:
-    """The component's FMU, built if it is one of ours and not there."""
+def _fmu_file(component: Component, path: Path, native: bool) -> tuple[Path, bool]:
+    """The component's FMU, built if it is one of ours and not there, and whether it is ours."""
     if component.source.is_file():
-        return component.source
+        return component.source, is_ours(component.source)
     if component.source.stem in BLOCKS:
-        return (cached_native_fmu if native else cached_fmu)(component.source.stem)
+        return (cached_native_fmu if native else cached_fmu)(component.source.stem), True
     raise DescriptionError(
         f"{path}, line {component.line}: component {component.name!r}: there is no file {component.source}, and no "
         f"block of imufmu is called {component.source.stem!r}; there is {', '.join(BLOCKS)}"

@@ -12,10 +12,11 @@ import numpy as np
 from .atomic import atomic_write
 
 
-def write_csv(path: str | os.PathLike[str], columns: Mapping[str, Any]) -> None:
+def write_csv(path: str | os.PathLike[str], columns: Mapping[str, Any], remark: str = "") -> None:
     """Write a table that reads back bit for bit (17 digits), whole or not at all.
 
     columns: (n,), or (n, k) for the columns name[1] .. name[k], by name; whole-number arrays are written as such.
+    remark: a last line, which # tells from the rows.
     Raises ValueError if the lengths differ, WriteError if the file cannot be written.
     """
     flat: dict[str, np.ndarray] = {}
@@ -32,3 +33,5 @@ def write_csv(path: str | os.PathLike[str], columns: Mapping[str, Any]) -> None:
     with atomic_write(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
         csv.writer(file, lineterminator="\n").writerow(flat)
         np.savetxt(file, table, fmt=",".join(formats))
+        if remark:
+            file.write(f"# {' '.join(remark.split())}\n")

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import hashlib
 import sys
-import tempfile
 import zipfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -20,6 +19,7 @@ from ..compiled.compilers import BuildError
 from ..files.atomic import atomic_write
 from ..files.cache import cached
 from ..files.locations import fmu_src_folder
+from ..files.scratch import scratch_folder
 from ..registry import BLOCKS
 from . import runtime
 from .documentation import icon, write_documentation
@@ -39,8 +39,8 @@ def build_fmu(name: str, folder: Path) -> Path:
     target = folder / f"{name}.fmu"
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryDirectory(prefix="imufmu_build_") as scratch:
-            built = _pythonfmu_build(name, Path(scratch))
+        with scratch_folder("build") as scratch:
+            built = _pythonfmu_build(name, scratch)
             with atomic_write(target) as temporary:
                 _repack(built, name, temporary)
     except OSError as error:
@@ -50,8 +50,13 @@ def build_fmu(name: str, folder: Path) -> Path:
 
 def cached_fmu(name: str) -> Path:
     """Path of the FMU of a registered block in the user's cache, built when its source has changed."""
-    folder = user_cache_path("imufmu") / f"{__version__}-{source_digest([fmu_src_folder() / f'{name}_fmu.py'])}"
+    folder = cache_folder(name)
     return cached(folder / f"{name}.fmu", lambda: build_fmu(name, folder))
+
+
+def cache_folder(name: str) -> Path:
+    """Where ``cached_fmu`` keeps the FMU of this block, built from the source as it is."""
+    return user_cache_path("imufmu") / f"{__version__}-{source_digest([fmu_src_folder() / f'{name}_fmu.py'])}"
 
 
 def source_digest(sources: Sequence[Path]) -> str:

@@ -16,7 +16,7 @@ from fmpy.validation import validate_fmu
 
 from ..files.archives import ArchiveError, read_members
 from .archive import fmu_members
-from .trial import HUNG, try_step
+from .trial import SECONDS, try_step
 
 _SYSTEMS = {"linux": ".so", "darwin": ".dylib", "win": ".dll"}  # the name darwin has a win in it
 _PLATFORMS = {
@@ -61,8 +61,11 @@ class Finding:
     text: str
 
 
-def examine(path: Path) -> list[Finding]:
-    """Everything there is to say. The FMU is sound, and runs here, if no finding is a problem."""
+def examine(path: Path, step_timeout: float = SECONDS) -> list[Finding]:
+    """Everything there is to say. The FMU is sound, and runs here, if no finding is a problem.
+
+    step_timeout: s, for one step of it, which is taken in a process of its own.
+    """
     try:
         names, _ = fmu_members(path)
         model = fmpy.read_model_description(str(path), validate=False)
@@ -77,7 +80,7 @@ def examine(path: Path) -> list[Finding]:
         findings.append(_python_packages(path))
     complete = [platform for platform in platforms if not _missing_library(platform, names, model)]
     findings += _hosts(complete, model, is_python)
-    findings.append(_trial(path, platforms, model))
+    findings.append(_trial(path, platforms, model, step_timeout))
     return findings
 
 
@@ -180,14 +183,14 @@ def _hosts(platforms: list[str], model: Any, is_python: bool) -> Iterator[Findin
         yield Finding(Level.NOTE if needs else Level.GOOD, host, text)
 
 
-def _trial(path: Path, platforms: list[str], model: Any) -> Finding:
+def _trial(path: Path, platforms: list[str], model: Any, seconds: float) -> Finding:
     if model.coSimulation is None and model.modelExchange is None:
         return Finding(Level.NOTE, "one step", "not tried: of no kind that FMPy runs")
     if not {fmpy.platform, fmpy.platform_tuple} & set(platforms):
         return Finding(Level.PROBLEM, "one step", f"not tried: no binary for this machine ({fmpy.platform})")
-    trial = try_step(path)
+    trial = try_step(path, seconds)
     # A crash by chance and one by design are different news; an endless loop is not worth another minute.
-    if trial.fault and trial.fault != HUNG and not try_step(path).fault:
+    if trial.fault and not trial.hung and not try_step(path, seconds).fault:
         return Finding(Level.NOTE, "one step", f"works on this machine in one of two tries; in the other {trial.fault}")
     said = f" It said: {' | '.join(trial.said.splitlines()[-3:])}" if trial.said else ""
     if trial.fault:

@@ -8,7 +8,6 @@ from __future__ import annotations
 import hashlib
 import os
 import shutil
-import tempfile
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from pathlib import Path
@@ -33,6 +32,7 @@ from ..compiled.compilers import (
 from ..files.atomic import atomic_write
 from ..files.cache import cached
 from ..files.locations import fmu_src_folder
+from ..files.scratch import scratch_folder
 from ..registry import BLOCKS
 from .build import source_digest, write_archive
 from .documentation import documentation_page, icon
@@ -74,9 +74,14 @@ def cached_native_fmu(name: str) -> Path:
 
     Built when its source or the compiler has changed. Raises BuildError as ``build_native`` does.
     """
-    digest = hashlib.sha256(f"{source_digest(_wrapper())} {identity()}".encode()).hexdigest()
-    folder = user_cache_path("imufmu") / f"{__version__}-native-{digest[:16]}"
+    folder = native_cache_folder()
     return cached(folder / f"{block_called(name).name}.fmu", lambda: build_native(name, folder))
+
+
+def native_cache_folder() -> Path:
+    """Where ``cached_native_fmu`` keeps FMUs built from the source as it is. Raises BuildError without a compiler."""
+    digest = hashlib.sha256(f"{source_digest(_wrapper())} {identity()}".encode()).hexdigest()
+    return user_cache_path("imufmu") / f"{__version__}-native-{digest[:16]}"
 
 
 def block_called(name: str) -> Block:
@@ -148,8 +153,8 @@ def _library(name: str, code: dict[str, bytes], platform: Platform) -> bytes:
         for source, content in code.items():
             with atomic_write(folder / "sources" / source) as temporary:
                 temporary.write_bytes(content)
-        with tempfile.TemporaryDirectory(prefix="imufmu_build_") as scratch:
-            made = Path(scratch) / file
+        with scratch_folder("build") as scratch:
+            made = scratch / file
             compile_library(calls, folder / "sources" / NATIVE_SOURCE, made)
             with atomic_write(kept) as temporary:
                 shutil.copyfile(made, temporary)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 from ..blocks.running import Trajectory
@@ -13,7 +14,7 @@ from ..pictures.bodies import body_of
 from ..pictures.figures import attitude_figure, save
 from ..pictures.movies import check_movie
 from ..scoring import metrics
-from ..scoring.systems import comparisons, knowing
+from ..scoring.systems import compare_all, comparisons, knowing, leave_out_unequal
 from ..scoring.table import Table
 from .run_report import write_run_report
 from .tables import range_table, summary_table
@@ -31,6 +32,11 @@ def check_pictures(system: System, figure: bool, report: Path | None, movie: Pat
     ):
         if not found:
             raise ValueError(f"{system.description.name}: nothing to draw: the system has {what}")
+    if len(plants) > 1:
+        raise ValueError(
+            f"{system.description.name}: nothing to draw: {' and '.join(plants)} report a vertical and no sample_time, "
+            "as a plant does; which one tells the truth is unclear"
+        )
     if movie:
         check_movie(movie)
         for name in ("position[1]", "q_NS[1]"):
@@ -49,19 +55,20 @@ def animate(result: Result, path: Path, progress: animation.Progress | None = No
     return animation.animate(path, result.system, body, comparisons(result), progress)
 
 
-def present_run(result: Result, figure: Path | None = None, report: Path | None = None) -> Table:
+def present_run(
+    result: Result, figure: Path | None = None, report: Path | None = None
+) -> tuple[Table, list[str], list[Path]]:
     """Errors of every estimator of the system, or the ranges of all variables where there is nothing to compare.
 
-    Writes a figure and an HTML report where paths are given. Raises WriteError, and ValueError where a figure is asked
-    for but the system has no truth and estimator.
+    Writes a figure and an HTML report where paths are given and there is a comparison. Returns the table, notes that
+    say what could not be compared, and the files written. Raises WriteError.
     """
-    found = comparisons(result)
+    found, notes = compare_all(result)
     if not found:
         if figure or report:
-            raise ValueError(
-                f"{result.system}: no figure: the system has no plant with a truth and estimator to compare"
-            )
-        return range_table(dict(result.columns), {name: unit or "" for name, unit in result.units.items()})
+            notes.append("no figure and no report: there is no truth and estimator to compare")
+        units = {name: unit or "" for name, unit in result.units.items()}
+        return range_table(dict(result.columns), units), notes, []
     if figure:
         drawn = attitude_figure(
             result.system,
@@ -71,20 +78,28 @@ def present_run(result: Result, figure: Path | None = None, report: Path | None 
         )
         save(drawn, figure)
     if report:
-        write_run_report(report, result, found)
-    return summary_table("estimator", {c.component: c.summary for c in found})
+        write_run_report(report, replace(result, notes=(*result.notes, *notes)), found)
+    table = summary_table("estimator", {c.component: c.summary for c in found})
+    return table, notes, [path for path in (figure, report) if path]
 
 
-def present_replay(replay: Replay, figure: Path | None = None) -> Table:
-    """Errors over the scored samples, or the ranges of all outputs where the recording has no truth.
+def present_replay(replay: Replay, figure: Path | None = None) -> tuple[Table, list[str]]:
+    """Errors over the scored samples, or the ranges of all outputs where there is nothing to compare; and notes.
 
     Writes a figure where a path is given. Raises WriteError.
     """
     recording, signals = replay.recording, replay.signals()
-    scored = recording.scored
+    scored, notes = recording.scored, []
     errors = {}
     if scored.any() and recording.truth.keys() & signals.keys():
-        errors = metrics.errors(metrics.at_rows(signals, scored), metrics.at_rows(recording.truth, scored))
+        estimated, true = (metrics.at_rows(some, scored) for some in (signals, recording.truth))
+        notes = leave_out_unequal(estimated, true, replay.estimator, recording.name)
+        try:
+            errors = metrics.errors(estimated, true)
+            figures = metrics.summary(errors)
+        except ValueError as error:
+            errors = {}
+            notes.append(f"{replay.estimator} is not compared with the truth: {error}")
     if figure:
         estimate = Trajectory(recording.time, signals)
         truth = Trajectory(recording.time, recording.truth) if recording.truth else None
@@ -96,5 +111,5 @@ def present_replay(replay: Replay, figure: Path | None = None) -> Table:
         )
         save(drawn, figure)
     if errors:
-        return summary_table("estimator", {replay.estimator: metrics.summary(errors)})
-    return range_table(replay.columns, replay.units)
+        return summary_table("estimator", {replay.estimator: figures}), notes
+    return range_table(replay.columns, replay.units), notes

@@ -6,7 +6,8 @@ a plant and tells the truth.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import math
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -36,13 +37,28 @@ class Comparison:
 
 
 def comparisons(result: Result) -> list[Comparison]:
-    """One comparison per estimator; empty without a truth or an estimator. Raises ValueError with two truths."""
+    """One comparison per estimator that can be compared; empty without a truth or an estimator."""
+    return compare_all(result)[0]
+
+
+def compare_all(result: Result) -> tuple[list[Comparison], list[str]]:
+    """One comparison per estimator, and notes that say what could not be compared and why."""
     plants, estimators = knowing(result.names)
     if not plants or not estimators:
-        return []
+        return [], []
     if len(plants) > 1:
-        raise ValueError(f"the system has several plants ({', '.join(plants)}): which one tells the truth is unclear")
-    return [_compare(result, plants[0], component) for component in estimators]
+        return [], [
+            f"nothing is compared: {' and '.join(plants)} report a vertical and no sample_time, as a plant does, and "
+            "which one tells the truth is unclear; an estimator needs the output sample_time"
+        ]
+    found: list[Comparison] = []
+    notes: list[str] = []
+    for component in estimators:
+        try:
+            found.append(_compare(result, plants[0], component, notes))
+        except ValueError as error:
+            notes.append(f"{component} is not compared with {plants[0]}: {error}")
+    return found, notes
 
 
 def knowing(names: Iterable[str]) -> tuple[list[str], list[str]]:
@@ -53,8 +69,10 @@ def knowing(names: Iterable[str]) -> tuple[list[str], list[str]]:
     return [component for component in attitudes if component not in estimators], estimators
 
 
-def _compare(result: Result, plant: str, component: str) -> Comparison:
+def _compare(result: Result, plant: str, component: str, notes: list[str]) -> Comparison:
+    """Signals of unequal size are left out, with a note. Raises ValueError for what cannot be compared at all."""
     estimate, truth = _signals(result, component), _signals(result, plant)
+    notes += leave_out_unequal(estimate, truth, component, plant)
     instants = np.unique(estimate["sample_time"])
     period = float(np.median(np.diff(instants))) if len(instants) > 1 else 1.0
     rows_hat, rows = metrics.equal_instants(estimate["sample_time"], result.time, period)
@@ -70,6 +88,19 @@ def _compare(result: Result, plant: str, component: str) -> Comparison:
         metrics.summary(errors),
         float(np.mean(result.time[rows_hat] - at_samples["sample_time"])),
     )
+
+
+def leave_out_unequal(
+    estimate: dict[str, np.ndarray], truth: Mapping[str, np.ndarray], component: str, plant: str
+) -> list[str]:
+    """Take those signals out of the estimate that have another size in the truth; a note for each."""
+    notes = []
+    for name in sorted(estimate.keys() & truth.keys()):
+        sizes = [math.prod(signals[name].shape[1:]) for signals in (estimate, truth)]
+        if sizes[0] != sizes[1]:
+            notes.append(f"{component}: {name} is not compared: it has {sizes[0]} elements, that of {plant} {sizes[1]}")
+            del estimate[name]
+    return notes
 
 
 def _signals(result: Result, component: str) -> dict[str, np.ndarray]:
