@@ -1,5 +1,5 @@
 # make demo    build FMUs, co-simulate, print a table, write a figure and a report
-# make test    check style and types, run the tests
+# make test    check style and types, run the tests; once more those that read recordings, with none to be found
 # make test-slow    the same and the tests that take minutes
 PYTHON ?= python3.11
 VENV := .venv
@@ -15,6 +15,7 @@ test: $(VENV)/installed
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/pytest -n auto --durations=10
+	IMUFMU_RECORDINGS=none $(BIN)/pytest -m recordings
 
 test-slow: test
 	$(BIN)/pytest -n auto -m slow

@@ -14,7 +14,10 @@ import numpy as np
 import pytest
 
 from imufmu.cli.main import main
+from support.optional import RECORDING_FIXTURES, broad
 from support.places import SHARED
+
+__all__ = ["broad"]  # a fixture of every test
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -27,7 +30,10 @@ def pytest_configure(config: pytest.Config) -> None:
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Long tests first: one that begins last would keep its worker while the others have nothing left to do."""
+    """Mark tests that read recordings, to be run once more without any; long tests first, lest workers wait for one."""
+    for item in items:
+        if RECORDING_FIXTURES & set(getattr(item, "fixturenames", ())):
+            item.add_marker("recordings")
     items.sort(key=lambda item: item.get_closest_marker("long") is None)
 
 

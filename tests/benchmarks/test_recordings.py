@@ -23,12 +23,11 @@ from imufmu.estimators import plumb
 from imufmu.files.csv_table import write_csv
 from imufmu.recordings.reading import read
 from imufmu.scoring import metrics
+from support.optional import needs
 from support.places import ROOT
 
-BROAD = ROOT.parent / "shared" / "data" / "broad"
-needs_broad = pytest.mark.skipif(not BROAD.is_dir(), reason="the BROAD recordings are not beside the checkout")
 PEERS = {contender.name: contender for contender in peers.peers()}
-needs_peers = pytest.mark.skipif(len(PEERS) < 3, reason="vqf and imufusion are not installed")
+needs_peers = needs("vqf", "imufusion")
 
 G = 9.81
 PERIOD = 0.005
@@ -295,12 +294,11 @@ def test_a_users_mistake_is_one_clear_message_and_exit_code_2(imufmu, tmp_path):
 # Real recordings
 
 
-@needs_broad
-def test_two_trials_of_broad_score_as_replayed(tmp_path):
+def test_two_trials_of_broad_score_as_replayed(tmp_path, broad):
     """Figures of docs/recordings.md, three digits, from the replay through the FMU."""
     for trial in ("01_undisturbed_slow_rotation_A", "15_undisturbed_fast_translation_A"):
-        (tmp_path / f"{trial}.mat").symlink_to(BROAD / f"{trial}.mat")
-    (tmp_path / "trials.json").symlink_to(BROAD / "trials.json")
+        (tmp_path / f"{trial}.mat").symlink_to(broad / f"{trial}.mat")
+    (tmp_path / "trials.json").symlink_to(broad / "trials.json")
     result = benchmark(tmp_path, ["lee2012"])
     assert rmse_of(result, "lee2012", "01_undisturbed_slow_rotation_A") == pytest.approx(0.832, abs=5e-4)
     assert rmse_of(result, "lee2012", "15_undisturbed_fast_translation_A") == pytest.approx(15.626, abs=5e-4)
@@ -308,15 +306,14 @@ def test_two_trials_of_broad_score_as_replayed(tmp_path):
 
 
 @pytest.mark.slow
-@needs_broad
 @needs_peers
-def test_the_page_on_recordings_tells_what_the_benchmark_prints():
+def test_the_page_on_recordings_tells_what_the_benchmark_prints(broad):
     """One row per filter: mean with the papers' parameters, truth delayed, with those for real recordings, delayed.
 
     Then the means of the heading errors, in the text.
     """
     page = (ROOT / "docs" / "recordings.md").read_text(encoding="utf-8")
-    sections = [section for section in tables(benchmark(BROAD)) if section.table]
+    sections = [section for section in tables(benchmark(broad)) if section.table]
     means: dict[str, list[str]] = {}
     for section in sections:
         if section.heading.startswith("Inclination RMSE"):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import shutil
 import sys
 from pathlib import Path
 
@@ -15,13 +14,13 @@ from imufmu.benchmarks import speed as speed_module
 from imufmu.benchmarks import speed_isolation
 from imufmu.benchmarks.speed import Speed, speed, tables, write_json
 from imufmu.benchmarks.speed_ways import NATIVE_IN_C, Trip, in_c_host
-from imufmu.compiled.compilers import compile_program, has_ziglang
+from imufmu.compiled.compilers import compile_program
 from imufmu.files.locations import fmu_src_folder
 from imufmu.fmi.native import cached_native_fmu
 from imufmu.registry import BLOCKS
+from support.optional import needs
 
-COMPILER = pytest.mark.skipif(not (has_ziglang() or shutil.which("cc")), reason="needs a C compiler")
-pytestmark = [COMPILER, pytest.mark.skipif(sys.platform == "win32", reason="the system's compiler is not used there")]
+pytestmark = needs("a C compiler", "POSIX")
 
 
 @pytest.fixture(scope="module")

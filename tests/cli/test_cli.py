@@ -17,6 +17,7 @@ from PIL import Image
 
 from imufmu.cosim.results import read_hdf5
 from imufmu.files.csv_table import write_csv
+from support.optional import needs
 
 
 @pytest.fixture
@@ -185,7 +186,7 @@ def test_a_users_mistake_is_one_clear_message_and_exit_code_2(case, imufmu, tmp_
     assert {path.name for path in tmp_path.iterdir()} == before
 
 
-@pytest.mark.skipif(os.name == "nt", reason="sends SIGINT as a terminal on Linux and macOS does")
+@needs("POSIX")  # sends SIGINT as a terminal does there
 def test_ctrl_c_ends_a_long_run_without_a_trace(tmp_path):
     environment = os.environ | {"TMPDIR": str(tmp_path / "scratch")}
     (tmp_path / "scratch").mkdir()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 import warnings
 from collections.abc import Iterator
 from pathlib import Path
@@ -13,13 +12,13 @@ import pytest
 from imufmu.blocks import running as interpreted
 from imufmu.blocks.block import ContinuousBlock, SampledBlock
 from imufmu.compiled import library, running
-from imufmu.compiled.compilers import has_ziglang
 from imufmu.registry import BLOCKS
 from support import motions
+from support.optional import needs
 
 SAMPLED = [block for block in BLOCKS.values() if isinstance(block, SampledBlock)]
 CONTINUOUS = [block for block in BLOCKS.values() if isinstance(block, ContinuousBlock)]
-needs_compiler = pytest.mark.skipif(not (shutil.which("cc") or has_ziglang()), reason="needs a C compiler")
+needs_compiler = needs("a C compiler")
 
 
 @pytest.fixture

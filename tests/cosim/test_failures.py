@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import gc
-import platform
 import signal
 import sys
 import tempfile
@@ -31,6 +30,7 @@ from support.cosim_stubs import (
     write_ssd,
     write_zip,
 )
+from support.optional import needs
 
 
 @pytest.fixture
@@ -215,7 +215,7 @@ def test_messages_of_other_programs_fmus_are_printed(capsys: pytest.CaptureFixtu
     assert capsys.readouterr().out == "[WARNING] hello\n"
 
 
-@pytest.mark.skipif(platform.machine() not in ("x86_64", "AMD64"), reason="calls a variadic function as a plain one")
+@needs("x86-64")  # calls a variadic function as a plain one
 def test_the_values_in_a_message_of_a_c_fmu_are_filled_in() -> None:
     messages = Messages()
     logger = CFUNCTYPE(None, c_void_p, c_char_p, c_int, c_char_p, c_char_p, c_int)(

@@ -8,7 +8,6 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
-from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -21,24 +20,17 @@ from imufmu.files.locations import models_folder
 from imufmu.registry import BLOCKS
 from support import fmu
 from support.foreign_hosts import HOSTS, INSTANCE
+from support.optional import missing
 from support.places import ROOT
 
 STEPS, H = 50, 0.01
-PACKAGES = {"fmpy": "fmpy", "libcosim": "libcosimpy", "ecos": "ecospy"}
 SYSTEMS = sorted(path.stem for path in models_folder().rglob("*.ssd"))
-
-
-@cache
-def fault(host: str) -> str:
-    """Why a host cannot be used here; empty if it can."""
-    done = subprocess.run([sys.executable, "-c", f"import {PACKAGES[host]}"], capture_output=True, text=True)
-    return done.stderr.strip().splitlines()[-1] if done.returncode else ""
 
 
 @pytest.fixture(params=HOSTS)
 def host(request: pytest.FixtureRequest) -> str:
-    if fault(request.param):
-        pytest.skip(f"{request.param}: {fault(request.param)}")
+    if missing(request.param):  # asked only when its turn comes: it takes seconds
+        pytest.skip(f"{request.param}: {missing(request.param)}")
     return str(request.param)
 
 

@@ -13,7 +13,7 @@ from imufmu.cli import main as cli
 from imufmu.registry import BLOCKS
 from imufmu.reports.demo import run_demo
 from support.pages import fences, shell_lines, table_rows
-from support.places import BROAD, ROOT
+from support.places import ROOT
 
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 PAGES = {path.stem: path.read_text(encoding="utf-8") for path in (ROOT / "docs").glob("*.md")}
@@ -59,11 +59,10 @@ def test_demo_table_is_what_the_demo_prints(tmp_path):
         assert f"| {' | '.join(row)} |" in PAGES["parameters"], row
 
 
-@pytest.mark.skipif(not BROAD.is_dir(), reason="the BROAD recordings are not beside the checkout")
 @pytest.mark.parametrize("trial", ["01_undisturbed_slow_rotation_A", "15_undisturbed_fast_translation_A"])
-def test_replay_numbers_are_what_replay_prints(trial, monkeypatch, capsys, tmp_path):
+def test_replay_numbers_are_what_replay_prints(trial, monkeypatch, capsys, tmp_path, broad):
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(sys, "argv", ["imufmu", "replay", str(BROAD / f"{trial}.mat"), "--estimator", "lee2012"])
+    monkeypatch.setattr(sys, "argv", ["imufmu", "replay", str(broad / f"{trial}.mat"), "--estimator", "lee2012"])
     with pytest.raises(SystemExit):
         cli.main()
     numbers, page = capsys.readouterr().out.splitlines()[1].split(), PAGES["recordings"]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -19,7 +20,6 @@ from imufmu.scoring import prediction
 from imufmu.scoring.metrics import inclination_error
 from support import golden, motions
 from support.motions import angle
-from support.places import BROAD
 
 G = 9.80665  # m/s2, start value of the block
 SPLIT, EXACT = 0, 1
@@ -304,8 +304,7 @@ def test_given_gravity_starts_the_filter_without_accelerometer() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.skipif(not BROAD.is_dir(), reason="the BROAD recordings are not beside the checkout")
-def test_real_recordings_come_out_within_a_degree_or_so() -> None:
+def test_real_recordings_come_out_within_a_degree_or_so(broad: Path) -> None:
     """Mean over the trials, cut-off 0.7 rad/s for gyroscopes with bias: measured 1.31, 0.97 and 1.11 deg.
 
     These gyroscopes report the mean rate since the sample before.
@@ -313,7 +312,7 @@ def test_real_recordings_come_out_within_a_degree_or_so() -> None:
     means = []
     for gyro_index in (0, 1, 2):
         errors = []
-        for path in sorted(BROAD.glob("*.mat")):
+        for path in sorted(broad.glob("*.mat")):
             trial = recordings.read(path)
             inputs = {"gyro": trial.gyro, "accel": trial.accel}
             parameters = {"sample_period": trial.sample_period, "cutoff": 0.7, "gyro_index": gyro_index}

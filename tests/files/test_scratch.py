@@ -13,6 +13,7 @@ import pytest
 
 from imufmu.files import scratch
 from imufmu.files.scratch import ScratchError, scratch_folder
+from support.optional import needs
 
 HOLD = "from imufmu.files.scratch import new_scratch; held = new_scratch('run'); print(held[0], flush=True); input()"
 
@@ -40,7 +41,7 @@ def test_a_folder_is_empty_our_own_and_gone_at_the_end(base: Path) -> None:
     assert list(base.iterdir()) == []
 
 
-@pytest.mark.skipif(sys.platform == "win32", reason="kills as POSIX does")
+@needs("POSIX")  # kills as is done there
 def test_the_folder_of_a_killed_process_is_swept_and_that_of_a_living_one_left_alone(base: Path) -> None:
     (dead, lost), (alive, kept) = held(base), held(base)
     (lost / "binaries").mkdir()

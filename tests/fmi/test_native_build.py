@@ -6,7 +6,6 @@ import re
 import shutil
 import struct
 import subprocess
-import sys
 import zipfile
 from pathlib import Path
 
@@ -25,9 +24,10 @@ from imufmu.fmi.native import block_called, build_native, cached_native_fmu, sou
 from imufmu.fmi.native_table import generate
 from imufmu.registry import BLOCKS
 from support import fmu
+from support.optional import needs, skip_without
 
 NAMES = list(BLOCKS)
-NEEDS_ZIG = pytest.mark.skipif(not compilers.has_ziglang(), reason="needs ziglang")
+NEEDS_ZIG = needs("ziglang")
 FMI_FUNCTIONS = {
     "GetTypesPlatform", "GetVersion", "SetDebugLogging", "Instantiate", "FreeInstance", "SetupExperiment",
     "EnterInitializationMode", "ExitInitializationMode", "Terminate", "Reset", "GetReal", "GetInteger", "GetBoolean",
@@ -77,7 +77,7 @@ def test_the_same_source_gives_the_same_bytes(tmp_path: Path) -> None:
     assert [path.name for path in tmp_path.iterdir()] == ["lee2012.fmu"]
 
 
-@pytest.mark.skipif(not shutil.which("cmake"), reason="fmpy compile needs CMake")
+@needs("cmake")
 def test_fmpy_compiles_the_sources_to_a_binary_with_the_same_results(tmp_path: Path) -> None:
     shutil.copytree(fmu.unpacked("lee2012", "native"), tmp_path, dirs_exist_ok=True)
     shutil.rmtree(tmp_path / "binaries")
@@ -112,15 +112,14 @@ COMPILERS = {
 @pytest.mark.parametrize("compiler", COMPILERS)
 @pytest.mark.parametrize("name", ["lee2012", "pendulum", "plumb", "handheld+imu+lee2012"])
 def test_compilers_of_c_and_of_c_plus_plus_are_silent(name: str, compiler: str, tmp_path: Path) -> None:
-    if not shutil.which(compiler):
-        pytest.skip(f"needs {compiler}")
+    skip_without(compiler)
     strict = ("-Wall", "-Wextra", "-Wconversion", "-pedantic", "-Werror", "-fsyntax-only")
     command = [compiler, *COMPILERS[compiler], *strict, "fmu.c"]
     said = subprocess.run(command, cwd=written(name, tmp_path), capture_output=True, text=True)
     assert (said.returncode, said.stderr) == (0, "")
 
 
-@pytest.mark.skipif(not shutil.which("cc"), reason="needs the system's C compiler")
+@needs("cc", "nm")
 def test_sources_of_several_fmus_are_linked_into_one_program(tmp_path: Path) -> None:
     """As the standard says: each compiled with the prefix of its name. The program asks each for its version."""
     names, objects = ["lee2012", "imu", "imu+lee2012"], []
@@ -142,7 +141,7 @@ def test_sources_of_several_fmus_are_linked_into_one_program(tmp_path: Path) -> 
     assert done.stdout.split() == ["2.0"] * len(names)
 
 
-@pytest.mark.skipif(not shutil.which("cc"), reason="needs the system's C compiler")
+@needs("cc", "nm")
 @pytest.mark.parametrize(
     ("defined", "expected"),
     [
@@ -159,7 +158,7 @@ def test_an_overriding_prefix_goes_before_and_without_one_the_names_are_plain(
     assert expected in {line.split()[-1].removeprefix("_") for line in table.stdout.splitlines() if "DoStep" in line}
 
 
-@pytest.mark.skipif(sys.platform != "linux" or not shutil.which("cc"), reason="reads symbols with objdump")
+@needs("Linux", "cc", "objdump")
 @pytest.mark.parametrize("name", ["lee2012", "plumb", "handheld"])
 def test_all_globals_are_constants_and_memory_is_asked_for_with_instances_and_states_only(
     name: str, tmp_path: Path
@@ -178,7 +177,7 @@ def test_all_globals_are_constants_and_memory_is_asked_for_with_instances_and_st
     assert states - {"room_for"} == {"fmi2GetFMUstate", "fmi2DeSerializeFMUstate"}
 
 
-@pytest.mark.skipif(sys.platform != "linux" or not shutil.which("nm"), reason="reads symbols with nm")
+@needs("Linux", "nm")
 @pytest.mark.parametrize("name", NAMES)
 def test_a_library_exports_the_fmi_functions_and_needs_the_c_library_only(name: str) -> None:
     own = PLATFORMS[own_platform()]

@@ -7,7 +7,6 @@ import os
 import re
 import shutil
 import subprocess
-import sys
 import zipfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -18,16 +17,15 @@ import pytest
 
 from imufmu.blocks.block import Block, SampledBlock
 from imufmu.blocks.instance import instantiate
-from imufmu.compiled.compilers import PLATFORMS, compile_program, has_ziglang, own_platform
+from imufmu.compiled.compilers import PLATFORMS, compile_program, own_platform
 from imufmu.files.locations import fmu_src_folder
 from imufmu.fmi.model_description import guid
 from imufmu.fmi.native import block_called, build_native
 from imufmu.registry import BLOCKS
+from support.optional import ARM_SYSTEM, needs
 
 STEPS, H = 50, 0.01
 HOST = fmu_src_folder() / "host" / "host.c"
-ZIG = has_ziglang()
-ARM_SYSTEM = Path("/usr/aarch64-linux-gnu")  # where Debian's libc6-arm64-cross puts the C library
 
 
 def inputs(count: int) -> np.ndarray:
@@ -83,14 +81,14 @@ def host(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return program
 
 
-@pytest.mark.skipif(sys.platform == "win32", reason="the host is built for POSIX systems here")
+@needs("POSIX")
 @pytest.mark.parametrize("name", [*BLOCKS, "imu+lee2012", "pendulum+imu+lee2012", "handheld+imu+plumb"])
 def test_a_c_program_gets_the_numbers_of_the_run_in_process(name: str, host: Path, tmp_path: Path) -> None:
     """Bit for bit: the same operations in the same order, the same C library."""
     assert np.array_equal(in_host(name, [], host, tmp_path, own_platform()), in_process(name))
 
 
-@pytest.mark.skipif(sys.platform != "linux" or not shutil.which("cmake"), reason="needs Linux, and CMake for FMPy")
+@needs("Linux", "cmake")
 def test_what_fmpy_compiles_as_documented_runs_in_a_host_without_the_mathematical_library(
     host: Path, tmp_path: Path
 ) -> None:
@@ -127,7 +125,7 @@ def windows(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
 BRIEFLY = ("imu", "plumb", "pendulum")
 
 
-@pytest.mark.skipif(not (ZIG and shutil.which("wine")), reason="needs ziglang and wine")
+@needs("ziglang", "wine")
 @pytest.mark.parametrize("name", [pytest.param(n, marks=() if n in BRIEFLY else pytest.mark.slow) for n in PORTABLE])
 def test_the_windows_build_gets_the_same_numbers_under_wine(
     name: str, windows: Mapping[str, str], tmp_path: Path
@@ -137,10 +135,7 @@ def test_the_windows_build_gets_the_same_numbers_under_wine(
     close(name, in_host(name, ["wine"], program, tmp_path, "win64", windows))
 
 
-@pytest.mark.skipif(
-    not (ZIG and shutil.which("qemu-aarch64") and ARM_SYSTEM.is_dir()),
-    reason="needs ziglang, qemu-aarch64 and the C library of 64-bit ARM",
-)
+@needs("ziglang", "qemu")
 @pytest.mark.parametrize("name", PORTABLE)
 def test_the_arm_build_gets_the_same_numbers_under_qemu(name: str, tmp_path: Path) -> None:
     program = tmp_path / "host"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -12,6 +11,7 @@ import pytest
 from imufmu.compiled.compilers import compile_program
 from imufmu.files.locations import fmu_src_folder
 from support import c_host, fmu
+from support.optional import skip_without
 from support.places import ROOT
 
 RUNS = 2
@@ -35,8 +35,7 @@ __attribute__((destructor)) static void use_memory(void) {
 @pytest.fixture(scope="module")
 def amplifier(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A library by which a use of freed memory at the end of a process kills it."""
-    if sys.platform != "linux" or not shutil.which("cc"):
-        pytest.skip("needs Linux and a C compiler")
+    skip_without("Linux", "cc")
     source = tmp_path_factory.mktemp("amplifier") / "amplifier.c"
     source.write_text(AMPLIFIER)
     library = source.with_suffix(".so")
@@ -47,8 +46,7 @@ def amplifier(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="module")
 def host(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The C host; skipped where Python FMUs cannot run in one."""
-    if not c_host.libpython():
-        pytest.skip("needs Linux and a Python with a shared library")
+    skip_without("libpython", "a C compiler")
     program = tmp_path_factory.mktemp("host") / "host"
     compile_program(fmu_src_folder() / "host" / "host.c", program)
     return program
@@ -56,9 +54,7 @@ def host(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.mark.parametrize("name", ["fmpy", "libcosim", "ecos"])
 def test_a_python_host_ends_well_whatever_uses_the_freed_memory(name: str, amplifier: Path) -> None:
-    package = {"fmpy": "fmpy", "libcosim": "libcosimpy", "ecos": "ecospy"}[name]
-    if subprocess.run([sys.executable, "-c", f"import {package}"], capture_output=True).returncode:
-        pytest.skip(f"needs {package}")
+    skip_without(name)
     program = f"""if True:
         import ctypes, sys
         from pathlib import Path

@@ -22,6 +22,7 @@ from imufmu.papers.experiment import Check
 from imufmu.papers.junit import write_junit
 from imufmu.papers.validate import PAPERS, Verdict, validate
 from imufmu.papers.verdicts import failure_table, verdict_table, write_json, write_page
+from support.optional import needs
 
 GOOD = """
 from matplotlib.figure import Figure
@@ -125,7 +126,7 @@ def test_a_process_that_dies_is_a_failure_not_a_hang(papers):
     assert not found["dead"].passed and "BrokenProcessPool" in found["dead"].error
 
 
-@pytest.mark.skipif(os.name == "nt", reason="sends SIGINT as a terminal on Linux and macOS does")
+@needs("POSIX")  # sends SIGINT as a terminal does there
 def test_an_experiment_leaves_ctrl_c_to_the_parent_process(papers):
     signalled = GOOD.replace("    progress(1, 2)\n", "    os.kill(os.getpid(), signal.SIGINT)\n")
     found = verdicts_of(papers(signalled="import os, signal\n" + signalled))
@@ -289,7 +290,7 @@ def test_a_paper_passes_its_quick_run_and_can_be_told_in_every_form(paper, tmp_p
     assert (tmp_path / "v.html").read_text(encoding="utf-8").count('class="passed"') == count + len(found)
 
 
-@pytest.mark.skipif(os.name == "nt", reason="sends SIGINT as a terminal on Linux and macOS does")
+@needs("POSIX")  # sends SIGINT as a terminal does there
 def test_ctrl_c_ends_the_experiments_too(tmp_path):
     done = "import pathlib\npathlib.Path('done').touch()\n"
     (tmp_path / "experiment_done.py").write_text(done + IDLE)

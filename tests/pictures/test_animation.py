@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-import shutil
 from pathlib import Path
 
 import numpy as np
@@ -25,6 +24,7 @@ from imufmu.plants.pendulum import PENDULUM
 from imufmu.reports.present import animate
 from imufmu.scoring.systems import comparisons
 from support.drawn_runs import result_of
+from support.optional import needs
 
 AIRCRAFT = np.array([[0.0, -1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])  # right, up, ahead: x ahead, z up
 
@@ -221,10 +221,8 @@ def test_a_long_run_says_how_much_faster_it_is_shown(tmp_path: Path, monkeypatch
         assert picture.n_frames == 6
 
 
-@pytest.mark.parametrize("suffix", [".gif", ".mp4"])
+@pytest.mark.parametrize("suffix", [".gif", pytest.param(".mp4", marks=needs("ffmpeg"))])
 def test_ctrl_c_leaves_the_old_file_and_nothing_else(tmp_path: Path, suffix: str) -> None:
-    if suffix == ".mp4" and not shutil.which("ffmpeg"):
-        pytest.skip("needs ffmpeg")
     path = tmp_path / f"a{suffix}"
     path.write_text("old")
 
@@ -238,7 +236,7 @@ def test_ctrl_c_leaves_the_old_file_and_nothing_else(tmp_path: Path, suffix: str
     assert [p.name for p in tmp_path.iterdir()] == [path.name]
 
 
-@pytest.mark.skipif(not shutil.which("ffmpeg"), reason="needs ffmpeg")
+@needs("ffmpeg")
 def test_an_mp4_is_written_by_ffmpeg(tmp_path: Path) -> None:
     animate(result_of(PENDULUM, 0.5), tmp_path / "a.mp4")
     assert (tmp_path / "a.mp4").read_bytes()[4:8] == b"ftyp"  # the mark of the format
@@ -250,7 +248,7 @@ def test_mp4_without_ffmpeg_says_what_to_do(monkeypatch: pytest.MonkeyPatch) -> 
         check_movie(Path("a.mp4"))
 
 
-@pytest.mark.skipif(not shutil.which("false"), reason="needs a program that fails")
+@needs("false")
 def test_an_ffmpeg_that_fails_is_one_clear_message_and_leaves_nothing(tmp_path: Path) -> None:
     with (
         rc_context({"animation.ffmpeg_path": "false"}),

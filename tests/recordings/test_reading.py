@@ -13,10 +13,6 @@ from imufmu.blocks.rotations import over_rows, quaternion_from_euler, vertical_f
 from imufmu.files.csv_table import write_csv
 from imufmu.recordings.matlab import read_matlab
 from imufmu.recordings.reading import Recording, RecordingError, read
-from support.places import BROAD
-
-TRIALS = sorted(BROAD.glob("*.mat"))
-needs_broad = pytest.mark.skipif(not TRIALS, reason="the TRIALS recordings are not beside the checkout")
 
 HEADER = "time,gyro[1],gyro[2],gyro[3],accel[1],accel[2],accel[3]"
 NAMES = HEADER.split(",")
@@ -248,11 +244,11 @@ def test_readings_at_instants_are_missing_where_rows_are(tmp_path: Path) -> None
     assert np.array_equal(gyro[recording.sample_index], recording.gyro)
 
 
-# TRIALS
+# BROAD
 
 
 def broad_like(path: Path, *, compressed: bool = True, **changes: np.ndarray | None) -> Path:
-    """A MATLAB file as TRIALS's, with some variables replaced or (None) left out."""
+    """A MATLAB file as BROAD's, with some variables replaced or (None) left out."""
     n = 30
     content: dict[str, np.ndarray | None] = {
         "imu_gyr": np.zeros((n, 3)),
@@ -342,9 +338,8 @@ def test_files_of_other_versions_say_what_to_do(tmp_path: Path) -> None:
         read(tmp_path / "a.mat")
 
 
-@needs_broad
-def test_every_broad_trial_is_read_without_doubts() -> None:
-    for path in TRIALS:
+def test_every_broad_trial_is_read_without_doubts(broad: Path) -> None:
+    for path in sorted(broad.glob("*.mat")):
         recording = read(path)
         assert recording.notes == (), path.name
         assert recording.sample_period == pytest.approx(0.0035, rel=1e-12)  # stored in double precision
@@ -357,9 +352,8 @@ def test_every_broad_trial_is_read_without_doubts() -> None:
         assert np.array_equal(recording.scored, known & (content["movement"].ravel() == 1))
 
 
-@needs_broad
-def test_broad_as_csv_is_the_same_recording(tmp_path: Path) -> None:
-    trial = read(TRIALS[0])
+def test_broad_as_csv_is_the_same_recording(tmp_path: Path, broad: Path) -> None:
+    trial = read(min(broad.glob("*.mat")))
     write_csv(tmp_path / "trial.csv", {"time": trial.time, **trial.readings, "q_NS": trial.truth["q_NS"]})
     copy = read(tmp_path / "trial.csv")
     assert copy.sample_period == trial.sample_period

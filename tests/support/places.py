@@ -1,4 +1,4 @@
-"""Where the repository and the real recordings lie, and what a test run builds once for all its workers."""
+"""Where the repository lies, and what a test run builds once for all its workers."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ from pathlib import Path
 from filelock import FileLock
 
 ROOT = Path(__file__).parents[2]
-BROAD = ROOT.parent / "shared" / "data" / "broad"
 SHARED = "IMUFMU_TESTS_SHARED"  # environment variable with the folder of this run; conftest.py sets it
 
 

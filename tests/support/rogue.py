@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import shutil
 import subprocess
-import sys
 from enum import IntEnum, auto
 from pathlib import Path
 
-import pytest
-
 from support.cosim_stubs import LIBRARY, model_description, variable, write_ssd, write_zip
+from support.optional import skip_without
 from support.places import built_once
 
 H = 0.125  # s
@@ -44,13 +41,11 @@ class Fault(IntEnum):
 
 def rogue() -> Path:
     """The FMU, with gyro and accel as an estimator has them; skips the test where there is no compiler for it."""
-    compiler = shutil.which("cc")
-    if compiler is None or sys.platform == "win32":
-        pytest.skip("needs a C compiler called cc, and POSIX")
+    skip_without("POSIX", "cc")
 
     def build(path: Path) -> None:
         library, source = path.with_suffix(".library"), Path(__file__).with_name("rogue.c")
-        command = [compiler, "-shared", "-fPIC", "-w", "-o", str(library), str(source), "-lpthread"]
+        command = ["cc", "-shared", "-fPIC", "-w", "-o", str(library), str(source), "-lpthread"]
         subprocess.run(command, check=True)
         variables = [variable("y", "output"), *(variable(name, "input") for name in INPUTS)]
         description = model_description([*variables, variable("fault", "parameter", "Integer")])

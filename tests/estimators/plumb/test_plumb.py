@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,7 +13,6 @@ from imufmu.blocks.signals import total_size
 from imufmu.compiled.running import run
 from imufmu.recordings.reading import read
 from imufmu.scoring.metrics import inclination_error
-from support.places import BROAD
 from support.plumb_motions import BLOCK, DEFAULTS, G, moving, rms
 from support.plumb_reference import reference_run
 from support.toys import eager
@@ -80,9 +80,9 @@ def test_the_covariance_stays_positive_and_bounded_over_hours() -> None:
 @pytest.mark.parametrize(
     ("trial", "limit_deg"), [("01_undisturbed_slow_rotation_A", 0.45), ("15_undisturbed_fast_translation_A", 0.5)]
 )
-def test_real_motion_is_followed_within_half_a_degree(trial: str, limit_deg: float) -> None:
+def test_real_motion_is_followed_within_half_a_degree(trial: str, limit_deg: float, broad: Path) -> None:
     """Against the truth as recorded; VQF has 0.60 and 0.47 deg."""
-    recording = read(BROAD / f"{trial}.mat")
+    recording = read(broad / f"{trial}.mat")
     result = run(BLOCK, {"gyro": recording.gyro, "accel": recording.accel}, {"sample_period": recording.sample_period})
     error = inclination_error(result["vertical"], recording.truth["vertical"])[recording.scored]
     assert np.rad2deg(rms(error)) < limit_deg
