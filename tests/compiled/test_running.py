@@ -98,12 +98,28 @@ def test_without_a_compiler_the_interpreter_serves_and_says_so_once(
 def test_a_library_that_others_can_write_is_not_loaded(fresh: Path) -> None:
     inputs = readings(BLOCKS["rizun2008"], 50)
     running.run(BLOCKS["rizun2008"], inputs)
-    (kept,) = fresh.rglob("rizun2008.*[!k]")
+    (kept,) = fresh.rglob(f"rizun2008{library._SUFFIX}")
     kept.chmod(0o666)
     library._loaded.cache_clear()
     with pytest.warns(UserWarning, match="belongs to others or can be written by them; delete it"):
         result = running.run(BLOCKS["rizun2008"], inputs)
     assert np.array_equal(result["roll"], interpreted.run(BLOCKS["rizun2008"], inputs)["roll"])
+
+
+@needs_compiler
+def test_a_kept_library_that_was_damaged_is_compiled_again(fresh: Path) -> None:
+    inputs = readings(BLOCKS["rizun2008"], 50)
+    running.run(BLOCKS["rizun2008"], inputs)
+    (kept,) = fresh.rglob(f"rizun2008{library._SUFFIX}")
+    whole = kept.read_bytes()
+    damaged = kept.with_name("damaged")
+    damaged.write_bytes(whole[: len(whole) // 2])
+    damaged.replace(kept)  # the file that is loaded stays as it is
+    for known in (library.compiled, library._loaded):
+        known.cache_clear()
+    result = running.run(BLOCKS["rizun2008"], inputs)
+    assert np.array_equal(result["roll"], interpreted.run(BLOCKS["rizun2008"], inputs)["roll"])
+    assert len(kept.read_bytes()) == len(whole)
 
 
 @needs_compiler

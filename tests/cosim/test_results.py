@@ -84,6 +84,28 @@ def test_an_empty_result_can_be_written_and_read(tmp_path: Path) -> None:
     assert read_hdf5(tmp_path / "a.h5").names == []
 
 
+def test_names_that_hdf5_cannot_hold_are_changed_with_a_note_and_come_back(tmp_path: Path) -> None:
+    names = ["f.a", "f.a/b", "f.a%2Fb", "f.", "f..", "f.v", "f.v[1]", "f.v[2]", "time.x", "/.y", "f.w/x[1]", "f.w/x[2]"]
+    names += ["f.der(x)", "f.ü"]
+    columns = {name: np.arange(3.0) + i for i, name in enumerate(names)}
+    result = Result("s", np.arange(3.0), columns, dict.fromkeys(names, "m"))
+    notes = result.to_hdf5(tmp_path / "a.h5")
+    assert f"f.a/b is f/a%2Fb in {tmp_path / 'a.h5'}, as HDF5 has no such names" in notes
+    assert {note.split(" is ")[0] for note in notes} == {
+        "f.a/b", "f.a%2Fb", "f.", "f..", "time.x", "/.y", "f.w/x"
+    }  # fmt: skip
+    again = read_hdf5(tmp_path / "a.h5")
+    assert set(again.names) == set(names)
+    for name in names:
+        assert again[name].tolist() == columns[name].tolist(), name
+        assert again.units[name] == "m"
+
+
+def test_a_result_is_shown_in_one_short_line(result: Result) -> None:
+    assert repr(result) == "<Result of 'a system': 9 variables, 7 rows from 0.1 to 0.7 s>"
+    assert repr(Result("none", np.empty(0), {}, {})) == "<Result of 'none': 0 variables, 0 rows>"
+
+
 @pytest.mark.parametrize("content", [None, b"", b"not HDF5"])
 def test_what_is_no_result_is_refused(tmp_path: Path, content: bytes | None) -> None:
     if content is not None:

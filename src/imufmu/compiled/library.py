@@ -19,7 +19,7 @@ from platformdirs import user_cache_path
 
 from ..blocks.block import Block, SampledBlock
 from ..files.atomic import atomic_write
-from ..files.cache import cached
+from ..files.cache import cached, is_whole
 from .equations import equations, functions_of, sizes
 
 _TEMPLATES = Path(__file__).parent / "c"
@@ -37,7 +37,7 @@ class Compiled:
     def __init__(self, block: Block) -> None:
         self._source = _source_of(block)
         self._path = _folder() / _digest(self._source) / f"{block.name}{_SUFFIX}"
-        self._rows = 0
+        self._rows, self._kept = 0, False
 
     def library(self, rows: int) -> Any | None:
         """The library (ctypes) for so many more samples or solver steps, or None where the interpreter serves better.
@@ -46,8 +46,11 @@ class Compiled:
         in all calls together, and there is a compiler.
         """
         self._rows += rows
-        if not self._path.is_file() and (self._rows < _ROWS_FOR_A_COMPILATION or not _made(self._path, self._source)):
-            return None
+        self._kept = self._kept or is_whole(self._path)
+        if not self._kept:
+            if self._rows < _ROWS_FOR_A_COMPILATION or not _made(self._path, self._source):
+                return None
+            self._kept = True
         return _loaded(self._path)
 
 

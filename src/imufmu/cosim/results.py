@@ -9,13 +9,15 @@ import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import chain
 from pathlib import Path
+from typing import Any
 
 import h5py
 import numpy as np
 
-from ..files.atomic import atomic_write
 from ..files.csv_table import write_csv
+from ..files.hdf5_table import Dataset, write_hdf5
 from .interface import near
 
 _ELEMENT = re.compile(r"(.+)\[(\d+(?:,\d+)*)\]")
@@ -38,6 +40,10 @@ class Result:
     units: Mapping[str, str | None]
     notes: tuple[str, ...] = ()
     partial: str = ""
+
+    def __repr__(self) -> str:
+        span = f" from {self.time[0]:g} to {self.time[-1]:g} s" if len(self.time) else ""
+        return f"<Result of {self.system!r}: {len(self.columns)} variables, {len(self.time)} rows{span}>"
 
     @property
     def names(self) -> list[str]:
@@ -88,29 +94,26 @@ class Result:
         """
         write_csv(path, {"time": self.time, **self.columns}, partial_remark(self.partial))
 
-    def to_hdf5(self, path: str | Path) -> None:
+    def to_hdf5(self, path: str | Path) -> list[str]:
         """Write ``/time`` and one dataset per variable, ``/component/variable``; a vector is one dataset (n, k).
 
         Each dataset has the attribute ``unit`` where the FMU names one; the file has ``system`` and ``notes``, and
-        ``partial`` where the result is.
+        ``partial`` where the result is. Returns notes on variables whose names HDF5 cannot hold: see ``write_hdf5``.
+        Raises WriteError.
         """
-        with atomic_write(path) as temporary, h5py.File(temporary, "w", track_order=True) as file:
-            file.attrs["system"] = self.system
-            file.attrs["notes"] = list(self.notes)
-            if self.partial:
-                file.attrs["partial"] = self.partial
-            file.create_dataset("time", data=self.time).attrs["unit"] = "s"
-            for name, first in self._datasets():
-                dataset = file.create_dataset(name.replace(".", "/", 1), data=self[name], track_order=True)
-                if self.units[first] is not None:
-                    dataset.attrs["unit"] = self.units[first]
+        variables = (Dataset(name.split(".", 1), self[name], self.units[first]) for name, first in self._datasets())
+        attributes: dict[str, Any] = {"system": self.system, "notes": list(self.notes)}
+        if self.partial:
+            attributes["partial"] = self.partial
+        return write_hdf5(path, attributes, chain([Dataset(["time"], self.time, "s")], variables))
 
     def _datasets(self) -> Iterator[tuple[str, str]]:
         """Names of whole vectors and of other columns, in order, each with its first column."""
         written = set()
         for column in self.columns:
             match = _ELEMENT.fullmatch(column)
-            name = match[1] if match and match[1] in self._arrays else column
+            is_element = match and match[1] in self._arrays and match[1] not in self.columns
+            name = match[1] if match and is_element else column
             if name not in written:
                 written.add(name)
                 yield name, column
@@ -129,7 +132,7 @@ def read_hdf5(path: str | Path) -> Result:
     def take(name: str, item: h5py.HLObject) -> None:
         if not isinstance(item, h5py.Dataset) or name == "time":
             return
-        values, full_name = item[()], name.replace("/", ".", 1)
+        values, full_name = item[()], str(item.attrs.get("name", name.replace("/", ".", 1)))
         for index in np.ndindex(values.shape[1:]):
             column = _element(full_name, index) if index else full_name
             columns[column] = np.ascontiguousarray(values[(slice(None), *index)])

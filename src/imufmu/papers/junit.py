@@ -29,7 +29,8 @@ def write_junit(path: Path, verdicts: Sequence[Verdict]) -> None:
         root.set(count, str(sum(int(suite.get(count)) for suite in root)))
     root.set("time", _seconds(sum(verdict.seconds for verdict in verdicts)))
     with atomic_write(path) as temporary:
-        etree.ElementTree(root).write(temporary, encoding="UTF-8", xml_declaration=True, pretty_print=True)
+        # Written by Python, as lxml tells a full disk by an error of its own.
+        temporary.write_bytes(etree.tostring(root, encoding="UTF-8", xml_declaration=True, pretty_print=True))
 
 
 def _suite(verdict: Verdict) -> etree._Element:
