@@ -9,8 +9,9 @@ from pathlib import Path
 import fmpy
 import pytest
 
+from imufmu.cosim.description import read_description
 from imufmu.files import archives
-from imufmu.files.archives import ArchiveError, check_xml, parse_xml, unpack
+from imufmu.files.archives import LARGEST_READ, ArchiveError, check_xml, parse_xml, unpack
 from imufmu.fmi.archive import open_fmu, read_fmu
 from support.cosim_stubs import LIBRARY, fake_fmu, model_description, stub, variable, write_zip
 
@@ -140,6 +141,57 @@ REMOTE_SCHEMA = b'<!DOCTYPE a SYSTEM "http://example.invalid/a.dtd"><a/>'
 def test_xml_with_a_doctype_is_refused_before_it_is_expanded(content: bytes) -> None:
     with pytest.raises(ArchiveError, match=r"model\.xml, line \d: a DOCTYPE is not allowed"):
         check_xml(content, "model.xml")
+
+
+@pytest.mark.parametrize("encoding", ["no-such", "GB2312", "shift_jis", "utf-7"])
+def test_xml_in_an_encoding_that_cannot_be_read_is_refused_by_name(encoding: str) -> None:
+    content = f'<?xml version="1.0" encoding="{encoding}"?><a>\u00e4</a>'.encode("latin-1")
+    with pytest.raises(ArchiveError, match=r"^model\.xml: its encoding cannot be read \(.*\); save it as UTF-8$"):
+        parse_xml(content, "model.xml")
+
+
+def test_xml_has_a_size_limit_wherever_it_comes_from(tmp_path: Path) -> None:
+    """A small archive must not cost minutes: 60 kB unfold to 60 MB."""
+    large = b"<a>" + b" " * LARGEST_READ + b"</a>"
+    with pytest.raises(ArchiveError, match=r"model\.xml: more than 16 MB"):
+        parse_xml(large, "model.xml")
+    with zipfile.ZipFile(tmp_path / "a.fmu", "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("modelDescription.xml", large)
+    with pytest.raises(ArchiveError, match=r"a\.fmu: modelDescription\.xml: more than 16 MB"):
+        read_fmu(tmp_path / "a.fmu")
+    (tmp_path / "a.ssd").write_bytes(large)
+    with pytest.raises(ArchiveError, match=r"a\.ssd: more than 16 MB"):
+        read_description(tmp_path / "a.ssd")
+
+
+@pytest.mark.parametrize("method", [zipfile.ZIP_LZMA, zipfile.ZIP_BZIP2, zipfile.ZIP_DEFLATED])
+def test_a_member_that_does_not_unpack_is_named_in_one_line(tmp_path: Path, method: int) -> None:
+    path = tmp_path / "a.fmu"
+    with zipfile.ZipFile(path, "w", method) as archive:
+        archive.writestr("modelDescription.xml", XML * 20)
+    content = bytearray(path.read_bytes())
+    content[60:90] = b"\xff" * 30
+    path.write_bytes(content)
+    with pytest.raises(ArchiveError, match=r"^.*a\.fmu: modelDescription\.xml cannot be unpacked: .+$"):
+        read_fmu(path)
+
+
+def test_an_archive_too_large_for_the_memory_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def read(*_arguments: object) -> bytes:
+        raise MemoryError
+
+    monkeypatch.setattr(zipfile.ZipFile, "read", read)
+    path = fake_fmu(tmp_path / "a.fmu", [variable("y", "output")])
+    with pytest.raises(ArchiveError, match=r"a\.fmu: modelDescription\.xml cannot be unpacked: MemoryError"):
+        read_fmu(path)
+
+
+def test_of_many_problems_the_first_are_told_and_the_number_of_the_others(tmp_path: Path) -> None:
+    variables = [variable(f"y{i}", "output").replace("causality", "cause") for i in range(100)]
+    path = write_zip(tmp_path / "a.fmu", {"modelDescription.xml": model_description(variables), LIBRARY: b""})
+    with pytest.raises(ArchiveError, match=r"; and \d+ more$") as caught:
+        read_fmu(path)
+    assert len(str(caught.value)) < 2000
 
 
 @pytest.mark.parametrize("content", [b"", b"<a>\n<b>\n</a>", b"<a/>\n\n<b/>", b"\xff\xff", b"<a>\n\n&lt</a>"])

@@ -25,7 +25,7 @@ from urllib.parse import unquote, urlparse
 
 from lxml import etree
 
-from ..files.archives import parse_xml
+from ..files.archives import LARGEST_READ, listed, parse_xml
 
 SSP = "http://ssp-standard.org/SSP1/"
 NAMESPACES = {
@@ -163,7 +163,8 @@ class Sources:
 def read_xml(path: Path, schema: str) -> Any:
     """Root element of an SSP file that follows the schema. Raises DescriptionError and ArchiveError."""
     try:
-        content = path.read_bytes()
+        with path.open("rb") as file:
+            content = file.read(LARGEST_READ + 1)
     except OSError as error:
         raise DescriptionError(f"{path}: cannot be read: {error.strerror or error}") from error
     root = parse_xml(content, str(path))
@@ -174,8 +175,8 @@ def read_xml(path: Path, schema: str) -> Any:
 def _validate(root: Any, schema: str, path: Path) -> None:
     rules = _schema(schema)
     if not rules.validate(root):
-        problems = "; ".join(f"line {entry.line}: {entry.message}" for entry in rules.error_log)
-        raise DescriptionError(f"{path}: not a valid {schema}: {problems}")
+        problems = [f"line {entry.line}: {entry.message}" for entry in rules.error_log]
+        raise DescriptionError(f"{path}: not a valid {schema}: {listed(problems)}")
 
 
 @lru_cache

@@ -11,20 +11,40 @@ import struct
 import xml.parsers.expat
 import zipfile
 import zlib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 from lxml import etree
 
+try:
+    from lzma import LZMAError
+except ImportError:  # Python was built without it, and says so for such an archive by a RuntimeError
+
+    class LZMAError(Exception):  # type: ignore[no-redef]
+        """Raised by nobody."""
+
+
 MOST_MEMBERS = 20_000
 LARGEST_UNPACKED = 2 * 2**30  # bytes
 LARGEST_RATIO = 100  # unpacked : packed, of archives that unpack to more than UNSUSPICIOUS
 UNSUSPICIOUS = 64 * 2**20  # bytes
+LARGEST_READ = 16 * 2**20  # bytes of a file that is read as a whole: 50 000 variables, and seconds of work
 
 # What zipfile lets through from damaged archives.
-_UNREADABLE = (zipfile.BadZipFile, zlib.error, struct.error, EOFError, RuntimeError, OSError, ValueError)
+_UNREADABLE = (
+    zipfile.BadZipFile,
+    zlib.error,
+    LZMAError,
+    struct.error,
+    EOFError,
+    RuntimeError,
+    OSError,
+    ValueError,
+    MemoryError,
+)
+_MOST_PROBLEMS = 5  # of one file, told at once
 
 
 class ArchiveError(ValueError):
@@ -38,11 +58,12 @@ def unpack(path: Path, folder: Path) -> None:
             try:
                 archive.extract(member, folder)
             except _UNREADABLE as error:
-                raise ArchiveError(f"{path}: {member.filename} cannot be unpacked: {error}") from error
+                raise ArchiveError(f"{path}: {member.filename} cannot be unpacked: {reason(error)}") from error
 
 
 def check_xml(content: bytes, where: str) -> None:
-    """Refuse XML that is malformed or has a document type (the door to entity bombs and external entities)."""
+    """Refuse XML that is malformed, large, or has a document type (the door to entity bombs and external entities)."""
+    _check_size(len(content), where)
 
     def refuse(*_declaration: Any) -> None:
         raise ArchiveError(f"{where}, line {parser.CurrentLineNumber}: a DOCTYPE is not allowed; remove it")
@@ -52,8 +73,12 @@ def check_xml(content: bytes, where: str) -> None:
     try:
         parser.Parse(content, True)
     except xml.parsers.expat.ExpatError as error:
-        reason = xml.parsers.expat.ErrorString(error.code)
-        raise ArchiveError(f"{where}, line {error.lineno}: not well-formed XML: {reason}") from error
+        fault = xml.parsers.expat.ErrorString(error.code)
+        raise ArchiveError(f"{where}, line {error.lineno}: not well-formed XML: {fault}") from error
+    except ArchiveError:
+        raise
+    except (LookupError, ValueError) as error:
+        raise ArchiveError(f"{where}: its encoding cannot be read ({reason(error)}); save it as UTF-8") from error
 
 
 def parse_xml(content: bytes, where: str) -> Any:
@@ -62,7 +87,14 @@ def parse_xml(content: bytes, where: str) -> Any:
     try:
         return etree.fromstring(content, etree.XMLParser(resolve_entities=False, no_network=True))
     except etree.XMLSyntaxError as error:
-        raise ArchiveError(f"{where}, line {error.lineno}: {error.msg}") from error
+        raise ArchiveError(f"{where}, line {error.lineno}: {reason(error)}") from error
+
+
+def listed(problems: Sequence[str]) -> str:
+    """The first problems of a file in one line, and how many more there are."""
+    shown = "; ".join(" ".join(problem.split()) for problem in problems[:_MOST_PROBLEMS])
+    more = len(problems) - _MOST_PROBLEMS
+    return f"{shown}; and {more} more" if more > 0 else shown
 
 
 def read_members(path: Path, wanted: Callable[[str], bool]) -> tuple[set[str], dict[str, bytes]]:
@@ -82,18 +114,18 @@ def _opened(path: Path) -> Iterator[zipfile.ZipFile]:
     except OSError as error:
         raise ArchiveError(f"{path}: cannot be read: {error.strerror or error}") from error
     except _UNREADABLE as error:
-        raise ArchiveError(f"{path}: not a zip archive, or cut off: {error}") from error
+        raise ArchiveError(f"{path}: not a zip archive, or cut off: {reason(error)}") from error
     with archive:
         members = archive.infolist()
         if len(members) > MOST_MEMBERS:
             raise ArchiveError(f"{path}: {len(members)} members; at most {MOST_MEMBERS} are accepted")
         seen: set[str] = set()
         for member in members:
-            reason = _why_harmful(member)
+            harm = _why_harmful(member)
             if member.filename in seen:
-                reason = "the name occurs twice"
-            if reason:
-                raise ArchiveError(f"{path}: member {member.orig_filename!r} refused: {reason}")
+                harm = "the name occurs twice"
+            if harm:
+                raise ArchiveError(f"{path}: member {member.orig_filename!r} refused: {harm}")
             seen.add(member.filename)
         unpacked = sum(member.file_size for member in members)
         limit = min(LARGEST_UNPACKED, max(UNSUSPICIOUS, LARGEST_RATIO * path.stat().st_size))
@@ -122,7 +154,18 @@ def _why_harmful(member: zipfile.ZipInfo) -> str:
 
 
 def _read(archive: zipfile.ZipFile, name: str, path: Path) -> bytes:
+    _check_size(archive.getinfo(name).file_size, f"{path}: {name}")
     try:
         return archive.read(name)
     except _UNREADABLE as error:
-        raise ArchiveError(f"{path}: {name} cannot be unpacked: {error}") from error
+        raise ArchiveError(f"{path}: {name} cannot be unpacked: {reason(error)}") from error
+
+
+def _check_size(size: int, where: str) -> None:
+    if size > LARGEST_READ:
+        raise ArchiveError(f"{where}: more than {LARGEST_READ // 2**20} MB; no larger file of this kind is read")
+
+
+def reason(error: BaseException) -> str:
+    """What an exception says, in one line; its kind where it says nothing, as MemoryError does."""
+    return " ".join(str(error).split()) or type(error).__name__

@@ -8,7 +8,7 @@ from typing import Any
 import fmpy
 from fmpy.model_description import ValidationError
 
-from ..files.archives import ArchiveError, parse_xml, read_members, unpack
+from ..files.archives import ArchiveError, listed, parse_xml, read_members, reason, unpack
 
 
 def fmu_members(path: Path) -> tuple[set[str], Any]:
@@ -41,9 +41,9 @@ def read_fmu(path: Path) -> Any:
     try:
         description = fmpy.read_model_description(str(path))
     except ValidationError as error:
-        raise ArchiveError(f"{where}: " + "; ".join(error.problems)) from error
+        raise ArchiveError(f"{where}: {listed(error.problems)}") from error
     except Exception as error:  # fmpy raises plain exceptions, and its parsing any ValueError or KeyError
-        raise ArchiveError(f"{where}: {error}") from error
+        raise ArchiveError(f"{where}: {reason(error)}") from error
     identifier = description.coSimulation.modelIdentifier
     if not any(candidate in names for candidate in _library_names(identifier)):
         raise ArchiveError(f"{path}: {_why_no_library(identifier, names)}")
