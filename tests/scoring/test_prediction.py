@@ -129,8 +129,8 @@ def test_prediction_of_a_device_is_that_of_its_noise_density(tmp_path: Path) -> 
 @pytest.mark.parametrize(
     ("imu", "slosh", "told"),
     [
-        ("mtz", 1.0, "mtz: no such IMU; there is .*mtx"),
-        ("nowhere.ssv", 1.0, r"nowhere\.ssv: no such IMU"),
+        ("mtz", 1.0, "no device is called 'mtz'; there is .*did you mean mtx"),
+        ("nowhere.ssv", 1.0, r"no device is called \'nowhere\.ssv\'"),
         (0.0, 1.0, "gyro noise density = 0 "),
         (0.001, -1.0, "slosh = -1 m/s"),
         (0.001, math.nan, "slosh = nan"),

@@ -11,11 +11,17 @@ import importlib.util
 import os
 import shlex
 import shutil
+import signal
 import struct
 import subprocess
 import sys
+from collections.abc import Iterator, Sequence
+from concurrent.futures import Executor
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
+from tempfile import TemporaryFile
+from typing import IO
 
 import fmpy
 
@@ -65,6 +71,9 @@ _OWN_FOLDER = {
 _ARITHMETIC = ("-fno-fast-math", "-ffp-contract=off", "-fno-math-errno", "-fno-tree-slp-vectorize")
 _FLAGS = ("-std=c99", "-O2", *_ARITHMETIC, "-fvisibility=hidden", "-shared", "-s")
 
+_running: set[subprocess.Popen[bytes]] = set()  # compilers, in any thread
+_SECONDS = 600.0  # of one call; the first one for Windows takes 75 s on a slow machine
+
 # Named behind the source, or the linker leaves it out.
 _LIBRARIES = {".so": ("-lm",)}
 
@@ -103,14 +112,14 @@ def compile_program(source: Path, target: Path, platform: Platform | None = None
     compiler = [sys.executable, "-m", "ziglang", "cc", *target_flags] if has_ziglang() else _system_compiler()
     suffix = (platform or PLATFORMS[own_platform()]).suffix
     libraries = ["-ldl"] if suffix == ".so" else []
-    _compile([*compiler, "-std=c99", "-O2", f"-I{HEADERS}", str(source), "-o", str(target), *libraries], source)
+    _compile([*compiler, "-std=c99", "-O2", f"-I{HEADERS}"], source, target, libraries)
 
 
 def identity() -> str:
     """Which compiler ``commands`` uses, with its version."""
     if has_ziglang():
         return f"ziglang {importlib.metadata.version('ziglang')}"
-    return subprocess.run([*_system_compiler(), "--version"], capture_output=True, text=True).stdout
+    return _said([*_system_compiler(), "--version"])[1]
 
 
 def _system_compiler() -> list[str]:
@@ -140,16 +149,70 @@ def compile_library(calls: list[list[str]], source: Path, target: Path) -> None:
     parts = []
     for i, call in enumerate(calls):
         part = target.with_name(f"{i}_{target.name}")
-        _compile([*call, str(source), "-o", str(part), *_LIBRARIES.get(target.suffix, ())], source)
+        _compile(call, source, part, _LIBRARIES.get(target.suffix, ()))
         parts.append(part.read_bytes())
     target.write_bytes(parts[0] if len(parts) == 1 else universal(parts))
 
 
-def _compile(command: list[str], source: Path) -> None:
-    made = subprocess.run(command, capture_output=True, text=True, errors="replace")
-    if made.returncode:
-        said = [line for line in made.stderr.splitlines() if "error" in line] or made.stderr.splitlines()
-        raise BuildError(f"{shlex.join(command[:5])} failed on {source}:\n" + "\n".join(said[:5]))
+def _compile(call: Sequence[str], source: Path, target: Path, libraries: Sequence[str]) -> None:
+    code, said = _said([*call, str(source), "-o", str(target), *libraries])
+    if code:
+        lines = [line for line in said.splitlines() if "error" in line] or said.splitlines()
+        raise BuildError(f"{_named(call)} failed on {source}:\n" + "\n".join(lines[:5]))
+    if not target.is_file() or not target.stat().st_size:
+        raise BuildError(f"{_named(call)} says that it compiled {source}, but made no file: is it a C compiler?")
+
+
+def _said(command: Sequence[str]) -> tuple[int, str]:
+    """Exit code and words of a compiler. Raises BuildError if it cannot be started or does not end.
+
+    It runs in a session of its own, so that what it starts ends with it, and through files, which nobody waits for.
+    """
+    with TemporaryFile() as words, _started(command, words) as process:
+        try:
+            process.wait(_SECONDS)
+        except subprocess.TimeoutExpired:
+            raise BuildError(f"{_named(command)} did not end within {_SECONDS:g} s; it was stopped") from None
+        finally:
+            _running.discard(process)
+            _end(process)
+        words.seek(0)
+        return process.returncode, words.read().decode(errors="replace")
+
+
+def _started(command: Sequence[str], words: IO[bytes]) -> subprocess.Popen[bytes]:
+    try:
+        process = subprocess.Popen(
+            command, stdin=subprocess.DEVNULL, stdout=words, stderr=subprocess.STDOUT, start_new_session=True
+        )
+    except OSError as error:
+        raise BuildError(f"{_named(command)} cannot be started: {error.strerror or error}") from error
+    _running.add(process)
+    return process
+
+
+def _end(process: subprocess.Popen[bytes]) -> None:
+    if os.name == "nt":
+        process.kill()
+        return
+    with suppress(ProcessLookupError, PermissionError):  # of its session nobody is left
+        os.killpg(process.pid, signal.SIGKILL)
+
+
+@contextmanager
+def compilers_end_with_us(pool: Executor) -> Iterator[None]:
+    """After Ctrl-C or any other exception no compiler that ``pool`` has started goes on, and none starts."""
+    try:
+        yield
+    except BaseException:
+        pool.shutdown(wait=False, cancel_futures=True)
+        for process in set(_running):
+            _end(process)
+        raise
+
+
+def _named(command: Sequence[str]) -> str:
+    return shlex.join(command[:5])
 
 
 def universal(libraries: list[bytes]) -> bytes:

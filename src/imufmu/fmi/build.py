@@ -16,9 +16,10 @@ from pythonfmu.builder import FmuBuilder
 
 from .. import __version__
 from ..compiled.compilers import BuildError
-from ..files.atomic import atomic_write
+from ..files.atomic import WriteError, atomic_write
 from ..files.cache import cached
 from ..files.locations import fmu_src_folder
+from ..files.names import no_such
 from ..files.scratch import scratch_folder
 from ..registry import BLOCKS
 from . import runtime
@@ -35,7 +36,7 @@ def build_fmu(name: str, folder: Path) -> Path:
     if "+" in name:
         raise BuildError(f"{name}: blocks in series make a native FMU only; build it with --native")
     if name not in BLOCKS:
-        raise BuildError(f"no block is called {name!r}; there is {', '.join(BLOCKS)}")
+        raise BuildError(no_such("block", name, BLOCKS))
     target = folder / f"{name}.fmu"
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -43,6 +44,8 @@ def build_fmu(name: str, folder: Path) -> Path:
             built = _pythonfmu_build(name, scratch)
             with atomic_write(target) as temporary:
                 _repack(built, name, temporary)
+    except WriteError as error:
+        raise BuildError(str(error)) from error
     except OSError as error:
         raise BuildError(f"cannot write {error.filename or target}: {error.strerror or error}") from error
     return target

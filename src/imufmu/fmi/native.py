@@ -26,12 +26,14 @@ from ..compiled.compilers import (
     Platform,
     commands,
     compile_library,
+    compilers_end_with_us,
     identity,
     own_platform,
 )
-from ..files.atomic import atomic_write
+from ..files.atomic import WriteError, atomic_write
 from ..files.cache import cached
 from ..files.locations import fmu_src_folder
+from ..files.names import no_such
 from ..files.scratch import scratch_folder
 from ..registry import BLOCKS
 from .build import source_digest, write_archive
@@ -64,6 +66,8 @@ def build_native(
         folder.mkdir(parents=True, exist_ok=True)
         with atomic_write(target) as temporary:
             write_archive(_members(block, code, wanted) | binaries, temporary)
+    except WriteError as error:
+        raise BuildError(str(error)) from error
     except OSError as error:
         raise BuildError(f"cannot write {error.filename or target}: {error.strerror or error}") from error
     return target
@@ -89,7 +93,7 @@ def block_called(name: str) -> Block:
     parts = name.split("+")
     unknown = [part for part in parts if part not in BLOCKS]
     if unknown:
-        raise BuildError(f"no block is called {unknown[0]!r}; there is {', '.join(BLOCKS)}")
+        raise BuildError(no_such("block", unknown[0], BLOCKS))
     try:
         return BLOCKS[name] if len(parts) == 1 else series(*(BLOCKS[part] for part in parts))
     except DeclarationError as error:
@@ -109,7 +113,7 @@ def _wrapper() -> list[Path]:
 
 def _platform(name: str) -> Platform:
     if name not in PLATFORMS:
-        raise BuildError(f"no platform is called {name!r}; there is {', '.join(PLATFORMS)}")
+        raise BuildError(no_such("platform", name, PLATFORMS))
     return PLATFORMS[name]
 
 
@@ -129,7 +133,7 @@ def _binaries(
     name: str, code: dict[str, bytes], platforms: Sequence[Platform], progress: Callable[[int, int], None] | None
 ) -> dict[str, bytes]:
     """Libraries of all platforms, by their place in the archive."""
-    with ThreadPoolExecutor(os.cpu_count()) as pool:
+    with ThreadPoolExecutor(os.cpu_count()) as pool, compilers_end_with_us(pool):
         running = {pool.submit(_library, name, code, platform): platform for platform in platforms}
         done = {}
         for future in as_completed(running):

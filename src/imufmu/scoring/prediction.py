@@ -23,9 +23,10 @@ from typing import Any
 import numpy as np
 
 from ..blocks.vocabulary import GRAVITY
-from ..cosim.description import NAMESPACES, read_xml
+from ..cosim.description import NAMESPACES, DescriptionError, read_xml
 from ..estimators.rizun2008 import mean_square_error, optimal_cutoff, tilt_variance
 from ..files.locations import models_folder
+from ..files.names import no_such
 from .table import Table
 
 __all__ = [
@@ -171,17 +172,17 @@ def bias_tilt(omega_g: Any, bias: Any) -> Any:
 def gyro_noise_density_of(imu: str | Path) -> float:
     """Gyroscope noise density (rad/s/sqrt(Hz)) of a parameter set: a name in models/imus, or an .ssv file.
 
-    Raises ValueError where there is none.
+    Raises ValueError where there is no such device, DescriptionError where the file does not tell.
     """
     folder = models_folder() / "imus"
     path = Path(imu) if Path(imu).suffix.lower() == ".ssv" else folder / f"{imu}.ssv"
     if not path.is_file():
-        known = ", ".join(sorted(known.stem for known in folder.glob("*.ssv")))
-        raise ValueError(f"{imu}: no such IMU; there is {known}, or give an .ssv file")
+        known = sorted(known.stem for known in folder.glob("*.ssv"))
+        raise ValueError(no_such("device", str(imu), known, "or give an .ssv file"))
     root = read_xml(path, "SystemStructureParameterValues")
     value = root.find("ssv:Parameters/ssv:Parameter[@name='gyro_noise_density']/ssv:Real", NAMESPACES)
     if value is None:
-        raise ValueError(f"{path}: sets no gyro_noise_density")
+        raise DescriptionError(f"{path}: sets no gyro_noise_density")
     return float(value.get("value"))
 
 
