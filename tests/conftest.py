@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from imufmu.cli import console
 from imufmu.cli.main import main
 from support.optional import RECORDING_FIXTURES, broad
 from support.places import SHARED
@@ -49,6 +50,7 @@ def imufmu(
 ) -> Callable[..., tuple[int, str, str]]:
     """Run the command in an empty folder; returns exit code, standard output, standard error."""
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(console, "_BETWEEN_LINES", 1e6)  # s; what is printed must not depend on how long it takes
 
     def call(*arguments: object) -> tuple[int, str, str]:
         monkeypatch.setattr(sys, "argv", ["imufmu", *map(str, arguments)])

@@ -8,7 +8,7 @@ import pytest
 
 from support.places import ROOT
 
-OWN_WAYS = r"skipif|importorskip|shutil\.which|find_spec\(|IMUFMU_RECORDINGS|[\"/]shared[\"/]"
+OWN_WAYS = r"skipif|importorskip|shutil\.which|(?<!def )find_spec\(|IMUFMU_RECORDINGS|[\"/]shared[\"/]"
 
 
 def test_nothing_optional_is_asked_for_anywhere_else() -> None:

@@ -12,14 +12,16 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.io import savemat
 from scipy.spatial.transform import Rotation
 
 from imufmu.benchmarks import peers
 from imufmu.benchmarks.contenders import FOR_REAL_RECORDINGS, TILT_TIME, with_real_parameters
-from imufmu.benchmarks.recordings import Benchmark, benchmark, tables, write_scores
+from imufmu.benchmarks.recordings import DELAY, Benchmark, benchmark, tables, write_scores
 from imufmu.compiled.running import run
 from imufmu.cosim.replay import estimator_fmu, replay
 from imufmu.estimators import plumb
+from imufmu.files.atomic import WriteError
 from imufmu.files.csv_table import write_csv
 from imufmu.recordings.reading import read
 from imufmu.scoring import metrics
@@ -178,7 +180,7 @@ def test_groups_are_means_over_their_recordings(folder: Path) -> None:
     groups = [{"name": name} for name in ("all_trials", "biased", "absent")]
     trials = {"drifting": {"groups": ["all_trials", "biased"]}, "calm": {"groups": ["all_trials"]}}
     (folder / "trials.json").write_text(json.dumps({"groups": groups, "trials": trials}))
-    result = benchmark(folder, ["rizun2008"])
+    result = benchmark(folder, ["rizun2008"], delay=DELAY)
     first, second, *_ = tables(result)
     assert first.heading == "Inclination RMSE (deg), parameters of the papers, truth as recorded"
     assert second.heading.endswith("truth delayed by 2.3 ms")
@@ -228,11 +230,27 @@ def test_the_heading_is_scored_where_there_is_a_magnetometer(tmp_path: Path) -> 
 
 
 def test_a_delayed_truth_is_explained_in_a_sentence(folder: Path) -> None:
-    as_recorded, delayed, *_ = tables(benchmark(folder, ["rizun2008"]))
-    assert not any("BROAD" in point for point in as_recorded.points)
-    assert delayed.points[0] == (
-        "each sample against the truth of 2.3 ms before: in every trial of BROAD it is ahead by 2.3 ms"
-    )
+    as_recorded, delayed, *_ = tables(benchmark(folder, ["rizun2008"], delay=DELAY))
+    assert not any("truth" in point for point in as_recorded.points)
+    assert delayed.points[0] == "each sample against the truth of 2.3 ms before"
+
+
+def test_only_trials_of_broad_are_taken_for_recorded_with_its_delay(folder: Path) -> None:
+    """Of the clocks of other recordings nothing is known, unless the user says it."""
+    columns = rocking(duration=4.0, rest=0.0)
+    attitude = np.column_stack([np.cos(columns["roll"] / 2), np.sin(columns["roll"] / 2)])
+    broad = {"imu_gyr": columns["gyro"], "imu_acc": columns["accel"], "imu_mag": columns["accel"]}
+    broad |= {"opt_quat": np.pad(attitude, ((0, 0), (0, 2))), "movement": np.ones((len(attitude), 1))}
+    savemat(folder / "trial.mat", broad | {"sampling_rate": np.array([[1 / PERIOD]])})
+    result = benchmark(folder, ["plumb"])
+    delays = {name: {s.delay for s in result.scores if s.recording == name} for name in ("trial", "calm", "drifting")}
+    assert delays == {"trial": {0.0, DELAY}, "calm": {0.0}, "drifting": {0.0}}
+    sections = {section.heading: section for section in tables(result)}
+    (delayed,) = (s for heading, s in sections.items() if "papers, truth delayed by 2.3 ms" in heading)
+    assert delayed.points[0].endswith("ms before: in every trial of BROAD it is ahead by that")
+    assert [row[0] for row in delayed.table.rows] == ["mean of 1", "trial"]
+    honesty = next(s for heading, s in sections.items() if heading.startswith("NEES"))
+    assert [row[0] for row in honesty.table.rows] == ["calm", "drifting", "trial"]
 
 
 def test_the_csv_file_holds_every_score_bit_for_bit(folder: Path, tmp_path: Path) -> None:
@@ -245,6 +263,14 @@ def test_the_csv_file_holds_every_score_bit_for_bit(folder: Path, tmp_path: Path
         assert float(row["inclination_rmse_deg"]) == score.inclination_rmse_deg
         assert (row["filter"], row["recording"]) == (score.contender, score.recording)
     assert {row["parameters"] for row in rows if row["filter"] == "lee2012 mode=3"} == {"mode=3"}
+
+
+def test_scores_never_overwrite_a_recording(folder: Path) -> None:
+    result = benchmark(folder, ["rizun2008"])
+    before = (folder / "calm.csv").read_bytes()
+    with pytest.raises(WriteError, match=r"calm\.csv: cannot write: it is read here"):
+        write_scores(folder / "calm.csv", result)
+    assert (folder / "calm.csv").read_bytes() == before
 
 
 # The command
@@ -261,7 +287,8 @@ def test_the_command_prints_tables_parameters_and_what_it_left_out(imufmu, folde
     write_csv(folder / "untrue.csv", {k: v for k, v in rocking().items() if k not in ("roll", "pitch")})
     code, text, errors = imufmu(folder, "-e", "rizun2008", "--csv", "s.csv")
     assert code == 0, errors
-    assert text.count("Inclination RMSE (deg)") == 4
+    assert text.count("Inclination RMSE (deg)") == 2
+    assert "BROAD" not in text + errors
     assert "  rizun2008: cutoff=0.4714 g=9.81 gyro_index=2\n" in text
     assert re.search(r"^mean of 2 +\d+\.\d\d", text, re.MULTILINE)
     assert "note: left out: " in errors and "notes.csv" in errors and "untrue.csv: no true attitude" in errors

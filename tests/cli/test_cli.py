@@ -158,7 +158,10 @@ WRONG = {
     "unknown component": (["run", "pendulum_lee2012", "--set", "lee.c_a=1"], "no component 'lee'"),
     "parameter out of range": (["run", "pendulum_lee2012", "--set", "lee2012.c_a=2"], "outside [0, 1]"),
     "no value": (["run", "pendulum_lee2012", "--set", "lee2012.c_a"], "expected NAME=VALUE"),
-    "text for a number": (["run", "pendulum_lee2012", "--set", "lee2012.c_a=high"], "'high' is not a number"),
+    "text for a number": (
+        ["run", "pendulum_lee2012", "--set", "lee2012.c_a=high"],
+        "c_a = high: expected a value of type Real",
+    ),
     "negative step": (["run", "pendulum_lee2012", "--step", "-0.1"], "steps of -0.1"),
     "animation of another kind": (["run", "pendulum_lee2012", "--animate", "a.avi"], ".gif or .mp4"),
     "animation into no folder": (["run", "pendulum_lee2012", "--animate", "none/a.gif"], "none"),
@@ -170,6 +173,19 @@ WRONG = {
     "output of another kind": (["replay", "{walk}", "-o", "o.xlsx"], ".csv"),
     "output into no folder": (["replay", "{walk}", "-o", "none/o.csv"], "none"),
     "a recording as FMU": (["info", "{walk}"], "no block is called"),
+    "a block spelt wrong": (["build", "Lee2012"], "did you mean lee2012?"),
+    "a system spelt wrong": (["run", "pendulum_lee2021"], "did you mean pendulum_lee2012?"),
+    "a device spelt wrong": (["predict", "--imu", "mtz"], "did you mean mtx?"),
+    "a block spelt wrong for the doctor": (["doctor", "plump"], "did you mean plumb?"),
+    "a file as folder": (["build", "lee2012", "--folder", "notes.txt"], "notes.txt is a file; give a folder"),
+    "a file as a part of a folder": (["demo", "--folder", "notes.txt/demo"], "notes.txt is a file; give a folder"),
+    "the recording as output": (["replay", "{walk}", "-o", "walk.csv"], "walk.csv: cannot write: it is read here"),
+    "the recording as output by another name": (["replay", "{walk}", "-o", "link.csv"], "link.csv: cannot write"),
+    "a recording of the folder as output": (
+        ["benchmark", ".", "--csv", "walk.csv"],
+        "walk.csv: cannot write: it is read",
+    ),
+    "the packed system as output": (["pack", "a.ssp", "./a.ssp"], "a.ssp: cannot write: it is read here"),
 }
 
 
@@ -177,6 +193,9 @@ WRONG = {
 def test_a_users_mistake_is_one_clear_message_and_exit_code_2(case, imufmu, tmp_path, walk):
     (tmp_path / "broken.fmu").write_bytes(b"PK\x03\x04 cut off")
     (tmp_path / "notes.txt").write_text("hello")
+    (tmp_path / "a.ssp").write_bytes(b"a system")
+    (tmp_path / "link.csv").symlink_to(walk)
+    contents = walk.read_bytes()
     before = {path.name for path in tmp_path.iterdir()}
     arguments, expected = WRONG[case]
     code, _, errors = imufmu(*(str(walk) if a == "{walk}" else a for a in arguments))
@@ -184,6 +203,7 @@ def test_a_users_mistake_is_one_clear_message_and_exit_code_2(case, imufmu, tmp_
     assert expected in errors
     assert "Traceback" not in errors
     assert {path.name for path in tmp_path.iterdir()} == before
+    assert walk.read_bytes() == contents and (tmp_path / "a.ssp").read_bytes() == b"a system"
 
 
 @needs("POSIX")  # sends SIGINT as a terminal does there

@@ -10,7 +10,7 @@ import pytest
 from fmpy.ssp.ssd import read_ssd
 from lxml import etree
 
-from imufmu import ArchiveError, DescriptionError, System, locate, pack
+from imufmu import ArchiveError, DescriptionError, System, WiringError, locate, pack
 from imufmu.cosim import system as system_module
 from imufmu.cosim.description import NAMESPACES
 from imufmu.cosim.packing import PARAMETER_SET
@@ -229,3 +229,20 @@ def test_systems_are_found_by_name_or_path(tmp_path: Path) -> None:
 def test_description_options_are_all_optional(tmp_path: Path) -> None:
     described: Any = System.read(write_ssd(tmp_path / "a.ssd", {"a": stub("clock")}, stop=None, step=None)).description
     assert (described.start_time, described.stop_time, described.step) == (None, None, None)
+
+
+def test_a_system_of_imufmu_is_read_by_its_name_as_it_is_simulated() -> None:
+    assert System.read("pendulum_lee2012").path == locate("pendulum_lee2012").resolve()
+    with pytest.raises(ValueError, match=r"no system is called 'pendulum_lee2021'; .*did you mean pendulum_lee2012"):
+        System.read("pendulum_lee2021")
+
+
+def test_a_parameter_that_is_text_takes_what_was_typed(tmp_path: Path) -> None:
+    """Also text that looks like a number; of a parameter set, which has types, the type must fit."""
+    fmu = fake_fmu(tmp_path / "a.fmu", [variable("y", "output"), variable("file", "parameter", "String", start="none")])
+    system = System.read(write_ssd(tmp_path / "s.ssd", {"a": fmu}))
+    for given, value in (("log.txt", "log.txt"), (12, "12"), ("007", "007")):
+        assert [s.value for s in system.settings_with({"a.file": given})] == [value]
+    bindings = {"a": binding({"file": ("Real", 12, None)})}
+    with pytest.raises(WiringError, match=r"a\.file = 12: expected a value of type String"):
+        System.read(write_ssd(tmp_path / "typed.ssd", {"a": fmu}, bindings=bindings))

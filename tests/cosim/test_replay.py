@@ -12,10 +12,13 @@ import pytest
 from imufmu import SimulationError, WiringError
 from imufmu.compiled.running import run
 from imufmu.cosim.replay import estimator_fmu, replay
+from imufmu.cosim.results import read_hdf5
 from imufmu.estimators import lee2012
+from imufmu.files.atomic import WriteError
 from imufmu.files.csv_table import write_csv
 from imufmu.fmi.build import cached_fmu
 from imufmu.recordings import reading as recordings
+from imufmu.registry import BLOCKS
 from support import golden
 
 PERIOD = 0.0035  # s, that of BROAD
@@ -157,6 +160,48 @@ def test_a_python_fmu_whose_script_fails_is_an_error_not_a_crash(script, tmp_pat
     recording = recordings.read(record(tmp_path / "r.csv", rng))
     with pytest.raises(SimulationError, match="lee2012: its Python script fails to load"):
         replay(recording, broken)
+
+
+def test_inputs_that_the_recording_does_not_have_stay_at_their_start_values_and_a_note_tells(tmp_path, rng):
+    recording = recordings.read(record(tmp_path / "six_axes.csv", rng))
+    for name, idle in (
+        ("plumb", "mag[1], mag[2], mag[3], forward_speed, forward_speed_valid"),
+        ("zihajehzadeh2014", "mag[1], mag[2], mag[3]"),
+    ):
+        result = replay(recording, cached_fmu(name))
+        assert f"inputs not in the recording stay at their start values: {idle}" in result.notes
+        direct = run(BLOCKS[name], recording.readings, {"sample_period": PERIOD}, start_time=5.0)
+        assert np.array_equal(result.signals()["vertical"], direct["vertical"])
+
+
+def test_the_speed_of_a_vehicle_is_used_where_the_recording_tells_it(tmp_path, rng):
+    speed = np.linspace(0.0, 20.0, 400)
+    speed[100:150] = np.nan
+    recording = recordings.read(record(tmp_path / "drive.csv", rng, forward_speed=speed))
+    assert np.array_equal(recording.at_instants()["forward_speed"], speed, equal_nan=True)
+    result = replay(recording, cached_fmu("plumb"))
+    assert "inputs not in the recording stay at their start values: mag[1], mag[2], mag[3]" in result.notes
+    inputs = recording.readings | {"forward_speed_valid": np.isfinite(speed).astype(float)}
+    direct = run(BLOCKS["plumb"], inputs, {"sample_period": PERIOD}, start_time=5.0)
+    without = run(BLOCKS["plumb"], {n: inputs[n] for n in ("gyro", "accel")}, {"sample_period": PERIOD}, start_time=5.0)
+    assert np.array_equal(result.signals()["vertical"], direct["vertical"])
+    assert not np.array_equal(direct["vertical"], without["vertical"])
+
+
+def test_a_replay_is_written_as_hdf5_too_and_never_over_its_recording(tmp_path, rng):
+    source = record(tmp_path / "r.csv", rng)
+    result = replay(recordings.read(source), cached_fmu("lee2012"))
+    assert result.to_hdf5(tmp_path / "o.h5") == []
+    again = read_hdf5(tmp_path / "o.h5")
+    assert again.system == "r" and again.units["lee2012.roll"] == "rad"
+    assert np.array_equal(again.time, result.recording.time)
+    for name, column in result.columns.items():
+        assert np.array_equal(again[f"lee2012.{name}"], column)
+    before = source.read_bytes()
+    with pytest.raises(WriteError, match=r"r\.csv: cannot write: it is read here"):
+        result.to_csv(source)
+    assert source.read_bytes() == before
+    assert len(repr(result)) < 100 and len(repr(result.recording)) < 300
 
 
 def test_an_estimator_is_a_name_or_a_file():

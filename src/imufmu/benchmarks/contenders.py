@@ -16,6 +16,7 @@ import numpy as np
 from ..blocks.block import SampledBlock
 from ..blocks.vocabulary import ACCEL, GYRO, MAG, VERTICAL
 from ..compiled.running import run
+from ..files.names import no_such
 from ..registry import ESTIMATORS
 
 Readings = Mapping[str, np.ndarray]  # by signal name, (n, 3), NaN where missing
@@ -81,12 +82,9 @@ def with_real_parameters(names: Sequence[str] = ()) -> list[Contender]:
 
 def _blocks(names: Sequence[str]) -> list[SampledBlock]:
     six_axis = {block.name: block for block in _of_tilt() if block.name not in _TILT_OF_ANOTHER}
-    unknown = [name for name in names if name not in six_axis]
-    if unknown:
-        raise ValueError(
-            f"no estimator of tilt from gyro and accel is called {', '.join(map(repr, unknown))}; "
-            f"there is {', '.join(six_axis)}"
-        )
+    for name in names:
+        if name not in six_axis:
+            raise ValueError(no_such("estimator of tilt from gyro and accel", name, six_axis))
     return [six_axis[name] for name in dict.fromkeys(names)] or list(six_axis.values())
 
 

@@ -7,7 +7,7 @@ bias by itself. Filters of others take part in both.
 Estimators of heading and VQF with its magnetometer are compared by ``benchmark_heading``.
 
 The truth comes from another clock than the readings. In BROAD it is ahead by a constant 2.3 ms, in every trial: at 5
-rad/s that alone is 0.7 deg. So every filter is scored against the truth as recorded, and against the delayed truth.
+rad/s that alone is 0.7 deg. So every filter is scored there against the truth as recorded and the delayed truth.
 
 [1] Laidig, Caruso, Cereatti, Seel, BROAD - A Benchmark for Robust Inertial Orientation Estimation, Data 6(7), 2021,
     doi:10.3390/data6070072
@@ -25,7 +25,7 @@ from typing import Any
 
 import numpy as np
 
-from ..files.atomic import atomic_write
+from ..files.atomic import atomic_write, check_not_read
 from ..papers.experiment import Progress
 from ..recordings.reading import Recording, RecordingError, read
 from ..reports.page import Section
@@ -58,16 +58,18 @@ class Score:
     groups: Sequence[str]
     inclination_rmse_deg: float
     nees: float = math.nan
+    is_broad: bool = False
 
 
 @dataclass(frozen=True)
 class Benchmark:
-    """Every score, the names of the groups in their order, and notes for the user."""
+    """Every score, the names of the groups in their order, notes for the user, and the files that were read."""
 
     scores: Sequence[Score]
     groups: Sequence[str]
     notes: Sequence[str]
     headings: Sequence[HeadingScore] = ()
+    files: Sequence[Path] = ()
 
 
 @dataclass(frozen=True)
@@ -81,13 +83,14 @@ def benchmark(
     folder: Path,
     names: Sequence[str] = (),
     *,
-    delay: float = DELAY,
+    delay: float | None = None,
     rest: float = REST,
     progress: Progress | None = None,
 ) -> Benchmark:
     """Run the estimators of these names, or all, and the installed peers over every recording with truth in a folder.
 
-    delay: of the truth, s, beside no delay. rest: how much of a recording's start is rest, s; 0 leaves the gyro as it
+    delay: of the truth, s, beside no delay; None: DELAY for trials of BROAD, and none for other recordings, of whose
+    clocks nothing is known. rest: how much of a recording's start is rest, s; 0 leaves the gyro as it
     is. Raises ValueError for an unknown estimator or a folder with nothing to score.
     """
     calibrated = f", gyro bias of the first {rest:g} s removed" if rest else ""
@@ -97,7 +100,7 @@ def benchmark(
     ]
     known = {contender.name for contest in contests for contender in contest.contenders}
     with_heading = [*(c for c in with_magnetometer() if not names or c.name in known), *heading_peers()]
-    paths = sorted(p for p in _entries(folder) if p.suffix.lower() in (".csv", ".mat"))
+    paths = recordings_in(folder)
     order, groups_of = _broad_groups(folder / GROUPS_FILE)
     scores: list[Score] = []
     headings: list[HeadingScore] = []
@@ -105,7 +108,8 @@ def benchmark(
     for done, path in enumerate(paths):
         try:
             recording = read(path)
-            truths = {d: _delayed(recording, d) for d in dict.fromkeys((0.0, delay))}
+            own = (DELAY if recording.is_broad else 0.0) if delay is None else delay
+            truths = {d: _delayed(recording, d) for d in dict.fromkeys((0.0, own))}
             scores += _scores(recording, truths, contests, groups_of.get(recording.name, ()), notes)
             headings += heading_scores(recording, groups_of.get(recording.name, ()), with_heading)
         except (RecordingError, _NothingToScore) as fault:
@@ -115,16 +119,18 @@ def benchmark(
     if not scores:
         found = f"; {notes[0]}" if notes else ", or .mat files of BROAD"
         raise ValueError(f"{folder}: no recording to score: put .csv files with a truth there{found}")
-    return Benchmark(scores, [name for name in order if any(name in s.groups for s in scores)], notes, headings)
+    groups = [name for name in order if any(name in s.groups for s in scores)]
+    return Benchmark(scores, groups, notes, headings, tuple(paths))
 
 
 class _NothingToScore(ValueError):
     """A recording without a vertical that counts; the message names it."""
 
 
-def _entries(folder: Path) -> list[Path]:
+def recordings_in(folder: Path) -> list[Path]:
+    """Every file in a folder that is read as a recording. Raises ValueError if there is no such folder."""
     try:
-        return list(folder.iterdir())
+        return sorted(path for path in folder.iterdir() if path.suffix.lower() in (".csv", ".mat"))
     except OSError as error:
         raise ValueError(f"{folder}: cannot list the folder: {error.strerror}") from None
 
@@ -175,6 +181,7 @@ def _scores(
                     groups,
                     rmse,
                     float(np.mean((error / std[counts]) ** 2)),
+                    recording.is_broad,
                 )
 
 
@@ -199,7 +206,7 @@ def _broad_groups(path: Path) -> tuple[list[str], dict[str, list[str]]]:
         content: Any = json.loads(path.read_text(encoding="utf-8"))
         order = [group["name"] for group in content["groups"]]
         return order, {name: list(trial["groups"]) for name, trial in content["trials"].items()}
-    except (ValueError, KeyError, TypeError, AttributeError) as fault:
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as fault:
         raise ValueError(f"{path}: not the list of trials that comes with BROAD ({fault!r})") from None
 
 
@@ -230,7 +237,9 @@ def _table(result: Benchmark, contest: str, delay: float) -> Section:
     truth = f"truth delayed by {1e3 * delay:g} ms" if delay else "truth as recorded"
     listed = (s for s in scores if s.parameters and not s.contender.endswith(s.parameters))
     parameters = dict.fromkeys(f"{s.contender}: {s.parameters}" for s in listed)
-    why = f"each sample against the truth of {1e3 * delay:g} ms before: in every trial of BROAD it is ahead by 2.3 ms"
+    why = f"each sample against the truth of {1e3 * delay:g} ms before"
+    if delay == DELAY and all(s.is_broad for s in scores):
+        why += ": in every trial of BROAD it is ahead by that"
     points = [*([why] if delay else []), *parameters]
     heading = f"Inclination RMSE (deg), {contest}, {truth}"
     return Section(heading, table=Table(["recordings", *contenders], rows), points=points)
@@ -238,8 +247,9 @@ def _table(result: Benchmark, contest: str, delay: float) -> Section:
 
 def _honesty(result: Benchmark) -> list[Section]:
     """NEES of every filter with a tilt_std, per recording, against the most delayed truth."""
-    delay = max(s.delay for s in result.scores)
-    scores = [s for s in result.scores if s.delay == delay and math.isfinite(s.nees) and "real" in s.contest]
+    latest = {s.recording: s.delay for s in sorted(result.scores, key=lambda s: s.delay)}
+    real = (s for s in result.scores if "real" in s.contest and s.delay == latest[s.recording])
+    scores = [s for s in real if math.isfinite(s.nees)]
     if not scores:
         return []
     contenders = list(dict.fromkeys(s.contender for s in scores))
@@ -252,6 +262,7 @@ def _honesty(result: Benchmark) -> list[Section]:
 
 def write_scores(path: Path, result: Benchmark) -> None:
     """Write every score as a row of a CSV file. Raises WriteError."""
+    check_not_read(path, result.files)
     with atomic_write(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(

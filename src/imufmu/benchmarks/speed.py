@@ -26,6 +26,7 @@ from ..compiled.compilers import identity
 from ..cosim.master import simulate
 from ..cosim.system import System, locate
 from ..files.atomic import atomic_write
+from ..files.names import no_such
 from ..files.scratch import scratch_folder
 from ..papers.experiment import Progress
 from ..papers.motions import parameter_set, record
@@ -121,7 +122,7 @@ def _trips(name: str, rates: Sequence[float]) -> list[Trip]:
     block = BLOCKS.get(name)
     if not isinstance(block, SampledBlock):
         sampled = [n for n, b in BLOCKS.items() if isinstance(b, SampledBlock)]
-        raise ValueError(f"no sampled block is called {name!r}; there is {', '.join(sampled)}")
+        raise ValueError(no_such("sampled block", name, sampled))
     if not all(0 < rate < np.inf for rate in rates):
         raise ValueError(f"sample rates must be positive and finite, not {', '.join(f'{rate:g}' for rate in rates)}")
     periods = dict.fromkeys((block.period, *(1 / rate for rate in rates)))

@@ -2,38 +2,58 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
 import typer
 
+from ..files.atomic import check_not_read
+
 
 def parsed_sets(sets: list[str] | None) -> dict[str, Any]:
-    """NAME=VALUE as a dict with numbers, truth values and vectors."""
+    """NAME=VALUE as a dict with numbers, truth values and vectors of them; other text, and text in quotes, as text."""
     values: dict[str, Any] = {}
     for text in sets or []:
         name, equals, value = text.partition("=")
         if not (name.strip() and equals and value.strip()):
             raise typer.BadParameter(f"{text!r}: expected NAME=VALUE, such as c_a=0.2", param_hint="--set")
-        parts = [_number(part.strip(), text) for part in value.split(",")]
-        values[name.strip()] = parts[0] if len(parts) == 1 else parts
+        values[name.strip()] = _parsed(value.strip())
     return values
 
 
-def _number(text: str, whole: str) -> Any:
+def _parsed(text: str) -> Any:
+    if len(text) > 1 and text[0] == text[-1] == '"':
+        return text[1:-1]
+    try:
+        parts = [_number(part.strip()) for part in text.split(",")]
+    except ValueError:
+        return text
+    return parts[0] if len(parts) == 1 else parts
+
+
+def _number(text: str) -> Any:
     if text.lower() in ("true", "false"):
         return text.lower() == "true"
-    for kind in (int, float):
-        try:
-            return kind(text)
-        except ValueError:
-            continue
-    raise typer.BadParameter(f"{whole!r}: {text!r} is not a number", param_hint="--set")
+    try:
+        return int(text)
+    except ValueError:
+        return float(text)
 
 
-def check_target(path: Path | None, *suffixes: str) -> None:
-    """Refuse a file to write before any work is done for it."""
-    if path and path.suffix.lower() not in suffixes:
+def check_target(path: Path | None, *suffixes: str, inputs: Iterable[str | Path] = ()) -> None:
+    """Refuse a file to write before any work is done for it: of another kind, in no folder, or one of the inputs."""
+    if not path:
+        return
+    if path.suffix.lower() not in suffixes:
         raise typer.BadParameter(f"{path}: the name must end in {' or '.join(suffixes)}")
-    if path and not path.absolute().parent.is_dir():
+    if not path.absolute().parent.is_dir():
         raise typer.BadParameter(f"{path}: no folder {path.absolute().parent}")
+    check_not_read(path, inputs)
+
+
+def check_folder(path: Path) -> None:
+    """Refuse a folder to write to that cannot be one, before any work is done for it."""
+    for part in (path, *path.parents):
+        if part.exists() and not part.is_dir():
+            raise typer.BadParameter(f"{part} is a file; give a folder, made if need be", param_hint="--folder")

@@ -9,7 +9,10 @@ import typer
 
 from ..cosim.errors import STEP_TIMEOUT
 from ..scoring.table import Table
-from .console import out, print_table, progress_bar
+from .arguments import check_folder
+from .console import Json, out, print_json, print_table, progress_bar
+
+Fmu = Annotated[str, typer.Argument(help="Name of a block, or an .fmu file")]
 
 
 def build(
@@ -39,6 +42,7 @@ def build(
 
     if platforms and not native:
         raise typer.BadParameter("give it together with --native", param_hint="--platform")
+    check_folder(folder)
     for name in BLOCKS if names == ["all"] else names:
         if native:
             with progress_bar(f"compiling {name}") as progress:
@@ -49,7 +53,7 @@ def build(
 
 
 def doctor(
-    fmu: Annotated[Path, typer.Argument(help="An .fmu file")],
+    fmu: Fmu,
     step_timeout: Annotated[
         float, typer.Option("--step-timeout", min=0.001, help="Seconds that its one step may take.")
     ] = STEP_TIMEOUT,
@@ -58,25 +62,32 @@ def doctor(
 
     \b
       imufmu doctor lee2012.fmu
+      imufmu doctor lee2012
     """
     from ..fmi.doctor import Level, examine
+    from ..fmi.info import file_of
 
-    findings = examine(fmu, step_timeout)
+    with progress_bar(f"trying {fmu}"):
+        findings = examine(file_of(fmu), step_timeout)
     print_table(Table(["", "what", "finding"], [[f.level.value, f.topic, f.text] for f in findings], words=True))
     if any(finding.level is Level.PROBLEM for finding in findings):
         raise typer.Exit(1)
 
 
-def info(fmu: Annotated[str, typer.Argument(help="Name of a block, or an .fmu file")]) -> None:
+def info(fmu: Fmu, json: Json = False) -> None:
     """Variables, parameters and platforms of an FMU.
 
     \b
       imufmu info lee2012
-      imufmu info plant.fmu
+      imufmu info plant.fmu --json
     """
-    from ..fmi.info import COLUMNS, describe
+    from ..fmi.info import COLUMNS, described, facts
 
-    heading, rows = describe(fmu)
+    told = facts(fmu)
+    if json:
+        print_json(told)
+        return
+    heading, rows = described(told)
     for line in heading:
         out.print(line, markup=False)
     print_table(Table(COLUMNS, rows, words=True))

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import io
+import platform
 import sys
+from contextlib import redirect_stdout
 from typing import Annotated
 
 import typer
@@ -10,8 +13,9 @@ import typer
 from .. import __version__
 from ..cosim.errors import SimulationError
 from ..cosim.interrupt import clean_up_when_asked_to_end
-from .console import err, out
+from .console import err, out, show_what_can_be_shown
 from .fmus import build, doctor, info
+from .listing import list_
 from .runs import demo, pack, replay, run
 from .speed import speed
 from .verdicts import benchmark, predict, validate
@@ -38,7 +42,12 @@ Exit codes: 0 success, 1 a finding (a criterion not met, a simulation failed), 2
 """
 
 app = typer.Typer(
-    help=EXAMPLES, no_args_is_help=True, add_completion=False, rich_markup_mode=None, pretty_exceptions_enable=False
+    help=EXAMPLES,
+    no_args_is_help=True,
+    add_completion=False,
+    rich_markup_mode=None,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
 )
 
 
@@ -49,33 +58,18 @@ def _root(version: Annotated[bool, typer.Option("--version", help="Print the ver
         raise typer.Exit
 
 
-@app.command("list")
-def list_() -> None:
-    """What there is: blocks, systems, devices.
-
-    \b
-      imufmu list
-    """
-    from ..cosim.description import read_description
-    from ..files.locations import models_folder
-    from ..registry import ESTIMATORS, PLANTS, SENSORS
-
-    for kind, blocks in (("estimator", ESTIMATORS), ("sensor", SENSORS), ("plant", PLANTS)):
-        for block in blocks:
-            out.print(f"{kind:10} {block.name:32} {block.summary}")
-    for path in sorted(models_folder().rglob("*.ssd")):
-        out.print(f"{'system':10} {path.stem:32} {read_description(path).description}")
-    for path in sorted((models_folder() / "imus").glob("*.ssv")):
-        out.print(f"{'device':10} {path.stem:32} parameter set of the sensor imu: {path}")
-
-
+app.command("list")(list_)
 for verb in (build, doctor, info, run, replay, pack, demo, validate, benchmark, speed, predict):
     app.command()(verb)
 
 
 def main() -> None:
     """Entry point: errors of the user become one line, never a stack trace."""
+    show_what_can_be_shown()
     clean_up_when_asked_to_end()
+    if sys.platform == "linux" and platform.machine() != "x86_64":
+        with redirect_stdout(io.StringIO()):  # FMPy says there that its logging library is not for this machine
+            import fmpy  # noqa: F401
     try:
         app()
     except KeyboardInterrupt:

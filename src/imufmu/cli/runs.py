@@ -8,8 +8,8 @@ from typing import Annotated
 import typer
 
 from ..cosim.errors import STEP_TIMEOUT
-from .arguments import check_target, parsed_sets
-from .console import notes, out, print_table, progress_bar, written
+from .arguments import check_folder, check_target, parsed_sets
+from .console import Json, notes, out, print_json, print_table, progress_bar, written
 from .saving import kept, save
 
 Sets = Annotated[
@@ -47,6 +47,7 @@ def run(
         Path | None,
         typer.Option("--animate", help="Draw the body and the estimated horizons into this .gif or .mp4 file."),
     ] = None,
+    json: Json = False,
 ) -> None:
     """Co-simulate a system of FMUs and compare its estimators with its plant.
 
@@ -55,6 +56,7 @@ def run(
       imufmu run pendulum_lee2012 --set lee2012.mode=3 --set imu.seed=7 --plot
       imufmu run pendulum_swing_up --report swing_up.html --animate swing_up.gif
       imufmu run my_system.ssd --stop 60 --step 0.005 --output run.csv
+      imufmu run pendulum_lee2012 --json
 
     The heading counts from East: an estimator without a magnetometer keeps what it does not know at the start.
     With --report or --animate the results also hold the points of the body, where the plant has the local variable
@@ -62,14 +64,16 @@ def run(
     the rows up to there are written, marked as partial.
     """
     from ..cosim.master import simulate
-    from ..cosim.system import System, locate
+    from ..cosim.system import System
     from ..pictures.bodies import recorded
     from ..reports.present import animate, check_pictures, present_run
+    from ..reports.tables import run_facts
 
-    check_target(output, ".csv", ".h5")
+    check_target(output, ".csv", ".h5", inputs=[system])
     check_target(report, ".html")
     check_target(animation, ".gif", ".mp4")
-    read = System.read(locate(system), native=native)
+    with progress_bar(f"preparing {system}"):  # builds our FMUs, which can take minutes with --native
+        read = System.read(system, native=native)
     check_pictures(read, plot, report, animation)
     with kept(output), progress_bar(f"running {read.description.name}") as progress:
         result = simulate(
@@ -88,12 +92,15 @@ def run(
     notes(result.notes)
     table, not_compared, pictures = present_run(result, figure, report)
     notes(not_compared)
-    print_table(table)
-    written(output, *pictures)
+    if json:
+        print_json(run_facts(result, [*result.notes, *not_compared]))
+    else:
+        print_table(table)
+        written(output, *pictures)
     if animation:
         with progress_bar(f"drawing {animation.name}") as progress:
             notes(animate(result, animation, progress))
-        written(animation)
+        written(None if json else animation)
 
 
 def replay(
@@ -106,6 +113,9 @@ def replay(
     output: Output = None,
     in_process: InProcess = False,
     step_timeout: StepTimeout = STEP_TIMEOUT,
+    rate: Annotated[
+        float | None, typer.Option("--rate", help="Samples per second of a .csv whose times are not to be used.")
+    ] = None,
     local_variables: Annotated[bool, typer.Option("--locals", help="Also write the FMU's local variables.")] = False,
     plot: Plot = False,
 ) -> None:
@@ -114,18 +124,20 @@ def replay(
     \b
       imufmu replay walk.csv --estimator lee2012 --set c_a=0.2 --output tilt.csv --plot
       imufmu replay 01_undisturbed_slow_rotation_A.mat --estimator my_filter.fmu
+      imufmu replay bunched_stamps.csv --rate 200 --output tilt.h5
 
     A CSV file names its columns time, gyro[1], gyro[2], gyro[3], accel[1], accel[2], accel[3] and, where there are
-    such, mag[1], mag[2], mag[3] and the truth: roll, pitch, yaw or q_NS[1] to q_NS[4]. Units: s, rad/s, m/s2, uT, rad.
-    With a truth the errors are printed.
+    such, mag[1], mag[2], mag[3], forward_speed and the truth: roll, pitch, yaw or q_NS[1] to q_NS[4]. Units: s, rad/s,
+    m/s2, uT, m/s, rad. Inputs of the FMU that the file does not have stay at their start values; a note tells. With a
+    truth the errors are printed.
     """
     from ..cosim.replay import estimator_fmu
     from ..cosim.replay import replay as replay_recording
     from ..recordings.reading import read
     from ..reports.present import present_replay
 
-    check_target(output, ".csv")
-    read_recording = read(recording)
+    check_target(output, ".csv", ".h5", inputs=[recording, estimator])
+    read_recording = read(recording, rate)
     with kept(output), progress_bar(f"replaying {read_recording.name}") as progress:
         result = replay_recording(
             read_recording,
@@ -159,8 +171,9 @@ def pack(
     from ..cosim.packing import pack as pack_system
     from ..cosim.system import locate
 
-    check_target(target, ".ssp")
-    pack_system(locate(system), target, native=native)
+    check_target(target, ".ssp", inputs=[system])
+    with progress_bar(f"packing {system}"):
+        pack_system(locate(system), target, native=native)
     out.print(str(target))
 
 
@@ -174,6 +187,7 @@ def demo(
     """
     from ..reports.demo import run_demo
 
+    check_folder(folder)
     with progress_bar("co-simulating the demo") as progress:
         made = run_demo(folder, progress)
     print_table(made.table)

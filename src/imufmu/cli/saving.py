@@ -14,7 +14,7 @@ from .console import notes
 def save(result: Any, path: Path | None) -> None:
     """Write a result to a .h5 or .csv file."""
     if path:
-        (result.to_hdf5 if path.suffix.lower() == ".h5" else result.to_csv)(path)
+        notes((result.to_hdf5 if path.suffix.lower() == ".h5" else result.to_csv)(path) or ())
 
 
 @contextmanager

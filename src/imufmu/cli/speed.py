@@ -36,10 +36,10 @@ def speed(
     check_target(json, ".json")
     with progress_bar("measuring") as progress:
         result = measure(blocks or BLOCKS_BY_DEFAULT, rates or [BROAD_RATE], progress=progress)
+    if json:
+        write_json(json, result)
     out.print("; ".join(f"{what}: {name}" for what, name in result.machine.items()), markup=False)
     for table in tables(result):
         out.print()
         print_table(table)
-    if json:
-        write_json(json, result)
     written(json)

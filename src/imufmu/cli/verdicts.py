@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from .arguments import check_target
-from .console import notes, out, print_table, progress_bar, written
+from .console import err, notes, out, print_table, progress_bar, written
+
+if TYPE_CHECKING:
+    from ..papers.validate import Verdict
 
 
 def validate(
@@ -36,24 +39,35 @@ def validate(
     check_target(report, ".html")
     check_target(junit, ".xml")
     check_target(json, ".json")
+    chosen = () if papers in (None, ["all"]) else papers
     with progress_bar("the papers' experiments") as progress:
-        verdicts = run_experiments(papers or (), quick=quick, drawn=report is not None, progress=progress)
-    print_table(verdict_table(verdicts))
-    for verdict in verdicts:
-        for remark in verdict.remarks:
-            out.print(f"remark on {verdict.name}: {remark}", markup=False)
+        verdicts = run_experiments(
+            chosen, quick=quick, drawn=report is not None, progress=progress, finished=_tell_of_one
+        )
     failures = failure_table(verdicts)
-    if failures:
-        print_table(failures)
-    if report:
-        write_page(report, verdicts, quick)
-    if junit:
-        write_junit(junit, verdicts)
-    if json:
-        write_json(json, verdicts, quick)
+    try:  # minutes of work: to files before anything else, and to the terminal whatever becomes of the files
+        if json:
+            write_json(json, verdicts, quick)
+        if junit:
+            write_junit(junit, verdicts)
+        if report:
+            write_page(report, verdicts, quick)
+    finally:
+        print_table(verdict_table(verdicts))
+        for verdict in verdicts:
+            for remark in verdict.remarks:
+                out.print(f"remark on {verdict.name}: {remark}", markup=False)
+        if failures:
+            print_table(failures)
     written(report, junit, json)
     if failures:
         raise typer.Exit(1)
+
+
+def _tell_of_one(verdict: Verdict) -> None:
+    """A line as soon as the experiments of one paper are done."""
+    word = "passed" if verdict.passed else "failed"
+    err.print(f"{verdict.name}: {word} after {verdict.seconds:.0f} s", markup=False)
 
 
 def benchmark(
@@ -62,8 +76,13 @@ def benchmark(
         list[str] | None, typer.Option("--estimator", "-e", help="Name of an estimator; all without. Repeatable.")
     ] = None,
     delay: Annotated[
-        float, typer.Option(min=-1.0, max=1.0, help="Score once more with the truth delayed by this (s).")
-    ] = 0.0023,
+        float | None,
+        typer.Option(
+            min=-1.0,
+            max=1.0,
+            help="Score once more with the truth delayed by this (s). Default: 0.0023 for trials of BROAD, else 0.",
+        ),
+    ] = None,
     rest_bias: Annotated[
         float, typer.Option(min=0.0, help="Rest at the start (s) whose mean gyro the second contest removes; 0: none.")
     ] = 3.0,
@@ -79,11 +98,13 @@ def benchmark(
     see imufmu replay --help.
     """
     from ..benchmarks.recordings import benchmark as score
-    from ..benchmarks.recordings import tables, write_scores
+    from ..benchmarks.recordings import recordings_in, tables, write_scores
 
-    check_target(csv, ".csv")
+    check_target(csv, ".csv", inputs=recordings_in(folder))
     with progress_bar(f"scoring {folder}") as progress:
         result = score(folder, estimators or (), delay=delay, rest=rest_bias, progress=progress)
+    if csv:
+        write_scores(csv, result)
     notes(result.notes)
     for section in tables(result):
         out.print(section.heading, markup=False)
@@ -92,8 +113,6 @@ def benchmark(
         if section.table:
             print_table(section.table)
         out.print()
-    if csv:
-        write_scores(csv, result)
     written(csv)
 
 

@@ -2,12 +2,16 @@
 
 fmpy's proxy, which formats C messages, knows one logger per process: the last one installed. So there is one here too;
 it tells instances apart by the environment that they were given, and prints what is not from an instance of ours.
+
+The proxy is a binary of fmpy that is not there for every platform, as on 64-bit ARM Linux. Messages then arrive as
+formats, their arguments not put in.
 """
 
 from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable
+from contextlib import suppress
 from ctypes import byref
 from itertools import count
 from typing import Any
@@ -21,7 +25,6 @@ from fmpy.fmi2 import (
     fmi2CallbackLoggerTYPE,
     fmi2OK,
 )
-from fmpy.logging import addLoggerProxy
 
 _LATEST = 3  # messages quoted with an error
 _MOST_WARNINGS = 50  # different warnings kept of one instance
@@ -48,7 +51,7 @@ class Messages:
             freeMemory=_FREE,
             componentEnvironment=self._environment,
         )
-        addLoggerProxy(byref(self.callbacks))
+        _format_messages_of(self.callbacks)
         _listening[self._environment] = self
 
     def close(self) -> None:
@@ -74,6 +77,14 @@ class Messages:
     def latest(self) -> str:
         """The last complaints, or the last remarks if there was no complaint; empty if the FMU said nothing."""
         return "; ".join(self._complaints or self._remarks)
+
+
+def _format_messages_of(callbacks: fmi2CallbackFunctions) -> None:
+    """Put fmpy's proxy before the logger, where there is one for this platform."""
+    with suppress(OSError):  # its library is loaded by the import
+        from fmpy.logging import addLoggerProxy
+
+        addLoggerProxy(byref(callbacks))
 
 
 def _receive(environment: int | None, instance: bytes, status: int, category: bytes, message: bytes) -> None:

@@ -13,7 +13,7 @@ from typing import Any
 
 from lxml import etree
 
-from ..files.atomic import atomic_write
+from ..files.atomic import atomic_write, check_not_read
 from .description import NAMESPACES, read_xml
 from .interface import representation, unit_of
 from .settings import Setting
@@ -30,6 +30,7 @@ def pack(ssd: str | Path, target: str | Path, *, native: bool = False) -> Path:
     native: as in System.read. Returns the path written. Raises what System.read raises, and WriteError.
     """
     system = System.read(ssd, native=native)
+    check_not_read(target, [ssd, *(part.fmu for part in system.parts)])
     root = read_xml(system.description.path, "SystemStructureDescription")
     members: dict[str, Path] = {}
     for bindings in root.findall(".//ssd:ParameterBindings", NAMESPACES):

@@ -10,8 +10,10 @@ from typing import Any
 
 import numpy as np
 
-from ..blocks.vocabulary import ACCEL, GYRO, MAG
+from ..blocks.vocabulary import ACCEL, FORWARD_SPEED, GYRO, MAG
+from ..files.atomic import check_not_read
 from ..files.csv_table import write_csv
+from ..files.names import no_such
 from ..fmi.archive import read_fmu
 from ..fmi.build import cached_fmu
 from ..fmi.native import cached_native_fmu
@@ -22,11 +24,13 @@ from .apart import Instance, Instances
 from .errors import STEP_TIMEOUT, SimulationError
 from .interface import Interface, WiringError, unit_of
 from .interrupt import Terminated, interrupt_between_calls
-from .results import partial_remark
+from .results import Result, partial_remark
 from .settings import Setting, given_settings
 from .slave import Inlet, Outlet
 
-_READINGS = {signal.name: signal for signal in (GYRO, ACCEL, MAG)}
+_READINGS = {signal.name: signal for signal in (GYRO, ACCEL, MAG, FORWARD_SPEED)}
+_OPTIONAL = (MAG.name, FORWARD_SPEED.name)
+_VALID = "_valid"  # end of the name of an input that is 1 where the reading of that name is to be used
 _BETWEEN_PROGRESS = 1000  # samples
 _SAME_PERIOD = 1e-6  # relative; a larger deviation would shift the sample clock by a sample within a minute or so
 
@@ -55,10 +59,25 @@ class Replay:
         vectors = {name.split("[")[0] for name in self.columns if "[" in name}
         return {name: np.column_stack(part) if name in vectors else part[0] for name, part in parts.items()}
 
-    def to_csv(self, path: Path) -> None:
+    def __repr__(self) -> str:
+        return f"<Replay of {self.recording.name!r} through {self.estimator}: {len(self.columns)} variables>"
+
+    def to_csv(self, path: str | Path) -> None:
         """Write time and all columns; where they are partial a last line says so, behind a #. Raises WriteError."""
+        check_not_read(path, [self.recording.path])
+        write_csv(path, {"time": self._time, **self.columns}, partial_remark(self.partial))
+
+    def to_hdf5(self, path: str | Path) -> list[str]:
+        """Write a file as that of a Result: ``/time`` and ``/estimator/variable``. Returns notes; raises WriteError."""
+        check_not_read(path, [self.recording.path])
+        columns = {f"{self.estimator}.{name}": column for name, column in self.columns.items()}
+        units = {f"{self.estimator}.{name}": unit for name, unit in self.units.items()}
+        return Result(self.recording.name, self._time, columns, units, self.notes, self.partial).to_hdf5(path)
+
+    @property
+    def _time(self) -> np.ndarray:
         rows = min((len(column) for column in self.columns.values()), default=len(self.recording.time))
-        write_csv(path, {"time": self.recording.time[:rows], **self.columns}, partial_remark(self.partial))
+        return self.recording.time[:rows]
 
 
 def estimator_fmu(name: str, *, native: bool = False) -> Path:
@@ -67,8 +86,8 @@ def estimator_fmu(name: str, *, native: bool = False) -> Path:
         return (cached_native_fmu if native else cached_fmu)(name)
     if Path(name).suffix.lower() == ".fmu":
         return Path(name)
-    known = ", ".join(block.name for block in ESTIMATORS)
-    raise ValueError(f"no estimator is called {name!r}; there is {known}, or give the path of an .fmu file")
+    known = [block.name for block in ESTIMATORS]
+    raise ValueError(no_such("estimator", name, known, "or give the path of an .fmu file"))
 
 
 def replay(
@@ -81,11 +100,11 @@ def replay(
     step_timeout: float = STEP_TIMEOUT,
     progress: Callable[[int, int], None] | None = None,
 ) -> Replay:
-    """Run the recording through an FMU whose inputs are gyro and accel (and mag), [1] to [3] each.
+    """Run the recording through an FMU whose inputs are gyro and accel (and mag), [1] to [3] each (and forward_speed).
 
     parameters: start values by variable name; ``sample_period`` follows the recording. Samples the recording lacks are
-    given as NaN to an FMU that reports a ``status``, and are held for any other. local_variables: also return those.
-    in_process, step_timeout: as for ``simulate``.
+    given as NaN to an FMU that reports a ``status``, and are held for any other; inputs that it lacks altogether stay
+    at their start values. local_variables: also return those. in_process, step_timeout: as for ``simulate``.
 
     Raises ArchiveError, WiringError (the FMU or a parameter does not fit) and SimulationError. That, and
     KeyboardInterrupt, has the rows up to there as ``result``, where there are any.
@@ -176,12 +195,14 @@ def _inputs(interface: Interface, recording: Recording, fmu: Path) -> tuple[list
     for name, signal in _READINGS.items():
         wanted = [element for element in signal.element_names() if element in inputs]
         if not wanted and name in instants:
-            if name != "mag":
+            if name not in _OPTIONAL:
                 problems.append(f"it has no input {name}[1]; its inputs are {', '.join(inputs) or 'none'}")
             continue
-        if wanted and name not in instants:
-            problems.append(f"it needs {name}, which {recording.path} does not have")
+        if name not in instants:
+            unset = [element for element in wanted if inputs[element].start is None]
+            problems += [f"it needs {element}, which {recording.path} does not have" for element in unset]
             continue
+        values = instants[name].reshape(len(instants[name]), -1)
         for i, element in enumerate(signal.element_names()):
             variable = inputs.get(element)
             if variable is None:
@@ -189,7 +210,10 @@ def _inputs(interface: Interface, recording: Recording, fmu: Path) -> tuple[list
             if unit_of(variable) not in (None, signal.unit):
                 problems.append(f"{element} is in {unit_of(variable)}, the recording in {signal.unit}")
             used.append(variable)
-            columns.append(instants[name][:, i])
+            columns.append(values[:, i])
+        if wanted and name + _VALID in inputs:
+            used.append(inputs[name + _VALID])
+            columns.append(np.isfinite(values).all(axis=1).astype(float))
     if problems:
         raise WiringError(fmu, problems, f"cannot replay {recording.path}")
     free = [variable.name for variable in inputs.values() if variable not in used]

@@ -14,6 +14,8 @@ from .interface import Interface, bounds_of, near, representation, unit_of
 
 Value = float | int | bool | str
 
+_GIVEN = "parameters"  # where values stand that come with a call
+
 
 @dataclass(frozen=True)
 class Setting:
@@ -63,7 +65,7 @@ def merged(*settings: Iterable[Setting]) -> tuple[Setting, ...]:
 def _as_written(name: str, value: Any) -> ParameterValue:
     kind = {bool: "Boolean", int: "Integer", str: "String"}.get(type(value), "Real")
     text = str(value).lower() if kind == "Boolean" else str(value)
-    return ParameterValue(name, kind, text, None, "parameters")
+    return ParameterValue(name, kind, text, None, _GIVEN)
 
 
 def _checked(
@@ -112,7 +114,7 @@ def _misfit(given: ParameterValue, variable: Any) -> str:
 def _parsed(given: ParameterValue, variable: Any) -> Value:
     """The value in the variable's type; whole numbers pass between Integer and Real. Raises ValueError."""
     kind = representation(variable)
-    if kind == "String" and given.type == "String":
+    if kind == "String" and (given.type == "String" or given.where == _GIVEN):  # what is typed may look like a number
         return given.value
     if kind == "Boolean" and given.value in ("true", "1", "false", "0"):
         return given.value in ("true", "1")

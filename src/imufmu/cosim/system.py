@@ -11,6 +11,7 @@ from typing import Any
 
 from ..files.archives import ArchiveError, unpack
 from ..files.locations import models_folder
+from ..files.names import no_such
 from ..files.scratch import new_scratch
 from ..fmi.archive import read_fmu
 from ..fmi.build import cached_fmu
@@ -51,13 +52,13 @@ class System:
 
     @staticmethod
     def read(path: str | Path, *, native: bool = False) -> System:
-        """Read an .ssd or .ssp file.
+        """Read an .ssd or .ssp file, or a system of imufmu by its name.
 
         An FMU that is not where the .ssd says, but is named after a block of imufmu, is built into the user's cache: in
         Python, or with ``native`` as compiled C. An FMU that is there is taken as it is. Raises DescriptionError,
         ArchiveError (FMU, archive or XML unfit), BuildError or WiringError (all misfits at once).
         """
-        path = Path(path).resolve()
+        path = locate(path).resolve()
         if path.suffix.lower() != ".ssp":
             return _read(path, native)
         scratch, delete = new_scratch("ssp")
@@ -95,9 +96,7 @@ def locate(name: str | Path) -> Path:
         return Path(name)
     systems = {path.stem: path for path in sorted(models_folder().rglob("*.ssd"))}
     if str(name) not in systems:
-        raise ValueError(
-            f"no system is called {str(name)!r}; there is {', '.join(systems)}, or give an .ssd or .ssp file"
-        )
+        raise ValueError(no_such("system", str(name), systems, "or give an .ssd or .ssp file"))
     return systems[str(name)]
 
 
@@ -142,8 +141,8 @@ def _fmu_file(component: Component, path: Path, native: bool) -> tuple[Path, boo
     if component.source.stem in BLOCKS:
         return (cached_native_fmu if native else cached_fmu)(component.source.stem), True
     raise DescriptionError(
-        f"{path}, line {component.line}: component {component.name!r}: there is no file {component.source}, and no "
-        f"block of imufmu is called {component.source.stem!r}; there is {', '.join(BLOCKS)}"
+        f"{path}, line {component.line}: component {component.name!r}: there is no file {component.source}, and "
+        + no_such("block of imufmu", component.source.stem, BLOCKS)
     )
 
 

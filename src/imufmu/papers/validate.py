@@ -9,7 +9,7 @@ import os
 import signal
 import time
 import traceback
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -17,6 +17,7 @@ from importlib import import_module
 from multiprocessing import active_children, get_context
 from typing import Any
 
+from ..files.names import no_such
 from ..pictures.figures import png
 from ..reports.page import Section
 from .experiment import Check, Experiment, Outcome, Progress
@@ -71,15 +72,17 @@ def validate(
     drawn: bool = False,
     papers: Mapping[str, str] = PAPERS,
     progress: Progress | None = None,
+    finished: Callable[[Verdict], None] | None = None,
 ) -> list[Verdict]:
     """Run the experiments of some papers, or of all: one process per paper, at most one per core at a time.
 
     quick: fewer seeds. drawn: keep the figures, as PNG images, for a report. papers: modules with an EXPERIMENT, by
-    name. Raises ValueError for an unknown paper. Experiments that break off give a verdict, not an exception.
+    name. finished: told of each paper as soon as it is done. Raises ValueError for an unknown paper. Experiments that
+    break off give a verdict, not an exception.
     """
-    unknown = [name for name in names if name not in papers]
-    if unknown:
-        raise ValueError(f"no paper is called {', '.join(map(repr, unknown))}; there is {', '.join(papers)}")
+    for name in names:
+        if name not in papers:
+            raise ValueError(no_such("paper", name, papers))
     chosen = list(dict.fromkeys(names)) or list(papers)
     context = get_context("spawn")  # as on Windows and macOS; a fork could copy a lock that another thread holds
     shares = context.Array("d", len(chosen))
@@ -89,7 +92,11 @@ def validate(
             runs = [pool.submit(_run, place, name, papers[name], quick, drawn) for place, name in enumerate(chosen)]
         pending = set(runs)
         while pending:
-            pending = wait(pending, _BETWEEN_PROGRESS, FIRST_COMPLETED).not_done
+            done, pending = wait(pending, _BETWEEN_PROGRESS, FIRST_COMPLETED)
+            if finished:
+                for name, run in zip(chosen, runs, strict=True):
+                    if run in done:
+                        finished(_verdict(name, run))
             if progress:
                 progress(round(_WHOLE * sum(shares[:])), _WHOLE * len(chosen))
         return [_verdict(name, run) for name, run in zip(chosen, runs, strict=True)]

@@ -7,6 +7,7 @@ A CSV recording has one header line and then one row per sample, in SI units, in
     gyro[1] .. gyro[3]            rad/s     gyroscope, sensor frame S
     accel[1] .. accel[3]          m/s2      accelerometer (specific force: +g on the axis that points up at rest), S
     mag[1] .. mag[3]              uT        magnetometer, S; optional
+    forward_speed                 m/s       speed along the vehicle's x axis as its wheels tell it; optional
     roll, pitch, yaw              rad       true Z-Y-X Euler angles; each optional
     q_NS[1] .. q_NS[4]            1         true attitude, Hamilton, scalar first, S to N (Z up); optional
 
@@ -23,6 +24,7 @@ import os
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -34,7 +36,7 @@ from .matlab import MatlabError, read_matlab
 from .sample_clock import ClockError, sample_clock
 
 _REQUIRED = (v.GYRO, v.ACCEL)
-_OPTIONAL = (v.MAG, v.Q_NS, v.ROLL, v.PITCH, v.YAW)
+_OPTIONAL = (v.MAG, v.FORWARD_SPEED, v.Q_NS, v.ROLL, v.PITCH, v.YAW)
 _TRUTH = (v.Q_NS, v.ROLL, v.PITCH, v.YAW)
 _UNITS = {"time": "s"} | {name: signal.unit for signal in (*_REQUIRED, *_OPTIONAL) for name in signal.element_names()}
 _PERIOD_BOUNDS = v.sample_period(0.01)
@@ -54,7 +56,7 @@ class Recording:
     missing. truth: q_NS (n, 4), vertical (n, 3), roll, pitch, yaw (n,), rad, as far as the file tells; NaN where
     unknown. scored: (n,), bool, samples that count for errors. Row i belongs to the instant
     time[0] + sample_index[i] * sample_period; instants that no row belongs to are missing samples. notes: what a user
-    should know but that is no error.
+    should know but that is no error. forward_speed: (n,), m/s; as mag, None where the file has none.
     """
 
     path: Path
@@ -67,6 +69,11 @@ class Recording:
     sample_period: float
     sample_index: np.ndarray
     notes: tuple[str, ...] = ()
+    forward_speed: np.ndarray | None = None
+
+    def __repr__(self) -> str:
+        known = ", ".join([*self.readings, *self.truth])
+        return f"<Recording {self.path}: {len(self.time)} rows, {1 / self.sample_period:.6g} Hz, {known}>"
 
     def __post_init__(self) -> None:
         for array in (self.time, self.scored, self.sample_index, *self.readings.values(), *self.truth.values()):
@@ -77,19 +84,24 @@ class Recording:
         return self.path.stem
 
     @property
+    def is_broad(self) -> bool:
+        """Whether it is a trial of BROAD: no other .mat file is read."""
+        return self.path.suffix.lower() == ".mat"
+
+    @property
     def readings(self) -> dict[str, np.ndarray]:
         """Readings by signal name, one row per row of the file."""
-        every = {"gyro": self.gyro, "accel": self.accel, "mag": self.mag}
+        every = {"gyro": self.gyro, "accel": self.accel, "mag": self.mag, "forward_speed": self.forward_speed}
         return {name: array for name, array in every.items() if array is not None}
 
     def at_instants(self) -> dict[str, np.ndarray]:
-        """Readings by signal name at every instant, NaN at missing samples: (sample_index[-1] + 1, 3).
+        """Readings by signal name at every instant, NaN at missing samples: sample_index[-1] + 1 rows.
 
         Results of a run over them belong to the rows of the file after indexing with ``sample_index``.
         """
         gridded = {}
         for name, array in self.readings.items():
-            gridded[name] = np.full((int(self.sample_index[-1]) + 1, 3), np.nan)
+            gridded[name] = np.full((int(self.sample_index[-1]) + 1, *array.shape[1:]), np.nan)
             gridded[name][self.sample_index] = array
         return gridded
 
@@ -102,28 +114,37 @@ def hold_missing(readings: np.ndarray) -> np.ndarray:
     return np.where(last >= 0, held, 0.0)
 
 
-def read(path: str | os.PathLike[str]) -> Recording:
-    """Read a recording: ``.csv`` (see above) or ``.mat`` (a trial of BROAD). Raises RecordingError."""
+def read(path: str | os.PathLike[str], rate: float | None = None) -> Recording:
+    """Read a recording: ``.csv`` (see above) or ``.mat`` (a trial of BROAD).
+
+    rate: Hz, of a .csv whose rows are evenly spaced but whose times are of no use, as those of a host that gets samples
+    in bunches; they are ignored then. Raises RecordingError.
+    """
     path = Path(path)
-    reader = {".csv": _read_csv, ".mat": _read_broad}.get(path.suffix.lower())
+    readers: dict[str, Callable[[Path], Recording]] = {".csv": partial(_read_csv, rate=rate), ".mat": _read_broad}
+    reader = readers.get(path.suffix.lower())
     if reader is None:
         raise RecordingError(
             f"{path}: cannot read {path.suffix or 'a file without suffix'}; use .csv, or .mat for BROAD"
         )
+    if rate is not None and not _PERIOD_BOUNDS.minimum <= 1 / (rate or np.nan) <= _PERIOD_BOUNDS.maximum:
+        raise RecordingError(f"{path}: a rate of {rate:g} Hz cannot be; give samples per second")
     try:
         return reader(path)
     except OSError as error:
         raise RecordingError(f"{path}: cannot read: {error.strerror or error}") from None
+    except MemoryError:
+        raise RecordingError(f"{path}: too large for this machine's memory; split it") from None
 
 
-def _read_csv(path: Path) -> Recording:
+def _read_csv(path: Path, rate: float | None) -> Recording:
     """Read the CSV format of the module docstring."""
     lines: list[int] = []
     try:
         with open(path, newline="", encoding="utf-8-sig") as file:
             reader = csv.reader(file)
             header = [name.strip() for name in next(reader, [])]
-            places, notes = _places(path, header)
+            places, notes = _places(path, header, rate is None)
             rows = _numbers(path, reader, header, places, lines)
     except UnicodeDecodeError:
         raise RecordingError(f"{path}: not a UTF-8 text file; save the table as CSV in UTF-8") from None
@@ -141,11 +162,17 @@ def _read_csv(path: Path) -> Recording:
     def where(row: int) -> str:
         return f"{path}, line {lines[row]}"
 
-    time = table["time"]
-    try:
-        period, index = sample_clock(time)
-    except ClockError as error:
-        raise RecordingError(f"{where(error.row)}, column 'time': {error}") from None
+    if rate is None:
+        time = table["time"]
+        try:
+            period, index = sample_clock(time)
+        except ClockError as error:
+            hint = "; or give the rate (--rate), if the rows are evenly spaced" if len(time) > 2 else ""
+            raise RecordingError(f"{where(error.row)}, column 'time': {error}{hint}") from None
+    else:
+        period, index = 1 / rate, np.arange(len(rows))
+        time = index / rate
+        notes.append(f"rows are taken for evenly spaced at {rate:g} Hz; times of the file are not used")
     missing = int(index[-1]) + 1 - len(time)
     if missing:
         longest = int(np.argmax(np.diff(time)))
@@ -155,7 +182,7 @@ def _read_csv(path: Path) -> Recording:
     return _recording(path, time, period, index, signals, np.ones(len(time), bool), notes, where)
 
 
-def _places(path: Path, header: Sequence[str]) -> tuple[dict[str, int], list[str]]:
+def _places(path: Path, header: Sequence[str], timed: bool) -> tuple[dict[str, int], list[str]]:
     """Place of every known column, and notes. Raises RecordingError with every problem of the header."""
     if not re.search("[a-df-z]", "".join(header), re.IGNORECASE):  # at most the e of 1e-3
         raise RecordingError(f"{path}, line 1: no names; the first line must name the columns: time, gyro[1], ...")
@@ -169,7 +196,7 @@ def _places(path: Path, header: Sequence[str]) -> tuple[dict[str, int], list[str
             known = match[1]
             problems.append(f"name column {name!r} just {known!r}, in SI units ({_UNITS[known]})")
     if not problems:
-        needed = ["time", *(name for signal in _REQUIRED for name in signal.element_names())]
+        needed = ["time"] * timed + [name for signal in _REQUIRED for name in signal.element_names()]
         for signal in _OPTIONAL:
             needed += signal.element_names() if places.keys() & set(signal.element_names()) else []
         missing = [name for name in needed if name not in places]
@@ -262,7 +289,8 @@ def _recording(
         truth = _complete({s.name: signals[s.name] for s in _TRUTH if s.name in signals}, where)
         for values in truth.values():
             scored = scored & np.isfinite(values.reshape(len(time), -1)).all(axis=1)
-        recording = Recording(path, time, gyro, accel, mag, truth, scored, period, index)
+        speed = signals.get("forward_speed")
+        recording = Recording(path, time, gyro, accel, mag, truth, scored, period, index, forward_speed=speed)
         return replace(recording, notes=(*notes, *_doubts(recording)))
 
 
@@ -284,7 +312,8 @@ def _complete(truth: Mapping[str, np.ndarray], where: Where) -> dict[str, np.nda
 
 def _doubts(recording: Recording) -> list[str]:
     """Notes on values that can be right but look like a wrong unit, axis or convention."""
-    usual = {name: _typical_length(array) for name, array in recording.readings.items()}
+    vectors = {name: array for name, array in recording.readings.items() if array.ndim > 1}
+    usual = {name: _typical_length(array) for name, array in vectors.items()}
     doubts = [f"{name} has no complete sample" for name, length in usual.items() if np.isnan(length)]
     if usual["accel"] < 5 or usual["accel"] > 20:
         hint = "; are the values in g?" if 0.5 < usual["accel"] < 2 else ""

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
-from ..scoring.systems import Comparison
+from ..cosim.results import Result
+from ..scoring.systems import Comparison, compare_all
 from ..scoring.table import Table
 
 _SHOWN = {
@@ -35,6 +37,14 @@ def run_table(compared: Sequence[Comparison]) -> Table:
     columns = [*errors.columns, "tilt 95th percentile (deg)", "delay (ms)"]
     further = [[f"{c.summary['tilt_p95_deg']:.3f}", f"{1e3 * c.delay:.3f}"] for c in compared]
     return Table(columns, [[*row, *more] for row, more in zip(errors.rows, further, strict=True)])
+
+
+def run_facts(result: Result, notes: Sequence[str]) -> dict[str, Any]:
+    """What ``run_table`` shows and more, for programs: figures of every estimator with the unit in the name."""
+    found, _ = compare_all(result)
+    estimators = {c.component: {name: float(v) for name, v in c.summary.items()} | {"delay_s": c.delay} for c in found}
+    span = {"start_time_s": float(result.time[0]), "stop_time_s": float(result.time[-1]), "rows": len(result.time)}
+    return {"system": result.system, **span, "variables": result.names, "estimators": estimators, "notes": list(notes)}
 
 
 def range_table(columns: Mapping[str, np.ndarray], units: Mapping[str, str]) -> Table:
