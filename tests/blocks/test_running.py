@@ -249,3 +249,9 @@ def test_a_simulation_refuses_inputs_that_do_not_fit() -> None:
         simulate(OSCILLATOR, 1.0, 0.1, {"torque": 0.0})
     with pytest.raises(ParameterError, match=r"oscillator: w = 0 rad/s is outside"):
         simulate(OSCILLATOR, 1.0, 0.1, parameters={"w": 0})
+
+
+def test_a_trajectory_is_shown_in_one_short_line() -> None:
+    assert repr(Trajectory(np.arange(3.0), {"roll": np.zeros(3), "P": np.zeros((3, 3, 3))})) == (
+        "<Trajectory of 3 rows: roll, P>"
+    )

@@ -28,6 +28,9 @@ class Trajectory:
     def __getitem__(self, name: str) -> np.ndarray:
         return self.values[name]
 
+    def __repr__(self) -> str:
+        return f"<Trajectory of {len(self.time)} rows: {', '.join(self.values)}>"
+
 
 # (block, state behind a sample, u, p, w of the samples that follow) -> (state behind the last one, y)
 Following = Callable[[SampledBlock, np.ndarray, np.ndarray, np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]
