@@ -19,7 +19,6 @@ from pathlib import Path
 
 import pytest
 
-from support import c_host
 from support.places import ROOT
 
 RECORDINGS = Path(os.environ.get("IMUFMU_RECORDINGS") or ROOT.parent / "shared" / "data")
@@ -52,6 +51,12 @@ def _arm() -> str:
     return _program("qemu-aarch64")
 
 
+def _libpython() -> str:
+    from support.c_host import libpython  # with every block, which few tests need
+
+    return "" if libpython() else "no Python with a shared library, as hosts on Linux need it"
+
+
 _PARTS: dict[str, Callable[[], str]] = {
     "imufusion": lambda: _package("imufusion"),
     "vqf": lambda: _package("vqf"),
@@ -71,7 +76,7 @@ _PARTS: dict[str, Callable[[], str]] = {
     "objdump": lambda: _program("objdump"),
     "wine": lambda: _program("wine"),
     "qemu": _arm,
-    "libpython": lambda: "" if c_host.libpython() else "no Python with a shared library, as hosts on Linux need it",
+    "libpython": _libpython,
     "a C compiler": _a_compiler,
     "Linux": lambda: "" if sys.platform == "linux" else "only on Linux",
     "POSIX": lambda: "only on Linux and macOS" if os.name == "nt" else "",
