@@ -99,6 +99,21 @@ def test_characters_that_a_table_cannot_show_are_replaced_before_it_is_aligned(
     assert printed.getvalue().decode().splitlines() == ["a  >=...", "1      2"]
 
 
+def test_text_between_colons_is_printed_as_it_is(capsys: pytest.CaptureFixture[str]) -> None:
+    """It may be a time, or JSON; the library behind would make pictures of words."""
+    console.out.print("a:x:b [bold]", markup=False)
+    console.notes(["12:30:00 :warning:"])
+    assert tuple(capsys.readouterr()) == ("a:x:b [bold]\n", "note: 12:30:00 :warning:\n")
+
+
+def test_too_little_memory_is_one_line(imufmu: Command, monkeypatch: pytest.MonkeyPatch) -> None:
+    def fails(*_arguments: object, **_options: object) -> list[Verdict]:
+        raise MemoryError
+
+    monkeypatch.setattr(gate, "validate", fails)
+    assert imufmu("validate") == (2, "", "error: not enough memory\n")
+
+
 def test_a_file_name_that_is_no_text_can_be_printed(terminal: Command, tmp_path: Path) -> None:
     name = os.fsdecode(b"\xff.csv")
     code, _ = terminal("utf-8")("replay", tmp_path / name)

@@ -78,6 +78,6 @@ def main() -> None:
     except SimulationError as error:
         err.print(f"error: {error}", markup=False)
         sys.exit(1)
-    except (ValueError, OSError) as error:
-        err.print(f"error: {error}", markup=False)
+    except (ValueError, OSError, MemoryError) as error:
+        err.print(f"error: {str(error) or 'not enough memory'}", markup=False)
         sys.exit(2)

@@ -172,10 +172,13 @@ def _said(command: Sequence[str]) -> tuple[int, str]:
         try:
             process.wait(_SECONDS)
         except subprocess.TimeoutExpired:
+            _end(process)
             raise BuildError(f"{_named(command)} did not end within {_SECONDS:g} s; it was stopped") from None
+        except BaseException:
+            _end(process)
+            raise
         finally:
             _running.discard(process)
-            _end(process)
         words.seek(0)
         return process.returncode, words.read().decode(errors="replace")
 
