@@ -74,7 +74,7 @@ class FmuSession:
         try:
             self._fmu.step(t, h)
         except FMICallException as error:
-            raise Refused(self._fmu.log[-1][1]) from error
+            raise Refused(next(text for status, text in reversed(self._fmu.log) if status == fmu.ERROR)) from error
         return self.outputs()
 
     def save(self) -> bytes:
