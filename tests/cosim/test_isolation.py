@@ -167,13 +167,22 @@ def test_one_signal_ends_a_run_whose_fmu_hangs(
 KILLED = """
 import sys
 from imufmu import simulate
+from imufmu.cosim import master
 from imufmu.fmi.child import Child
+
+master._BETWEEN_PROGRESS = -1.0
 start = Child.__init__
+
 def tell(self, *arguments):
     start(self, *arguments)
     print(self._process.pid, flush=True)
+
+def last_before_it_hangs(done, total):
+    if done == 4:
+        print("now", flush=True)
+
 Child.__init__ = tell
-simulate(sys.argv[1], parameters={"rogue.fault": 6})
+simulate(sys.argv[1], parameters={"rogue.fault": 6}, progress=last_before_it_hangs)
 """
 
 
@@ -183,6 +192,8 @@ def test_processes_and_folders_of_a_killed_run_do_not_survive_it(tmp_path: Path)
     run = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=os.environ | {"TMPDIR": str(scratch)})
     assert run.stdout
     process = int(run.stdout.readline())
+    assert run.stdout.readline() == "now\n"
+    time.sleep(0.2)  # until the step has begun; a process that is told nothing more would end by itself
     run.kill()
     run.communicate()
     assert ended(process)
@@ -194,7 +205,10 @@ def test_ours_are_those_built_here_to_the_last_byte(tmp_path: Path) -> None:
     built, copy = cached_fmu("lee2012"), tmp_path / "lee2012.fmu"
     copy.write_bytes(built.read_bytes())
     assert is_ours(built) and is_ours(copy)
-    copy.write_bytes(built.read_bytes() + b"\0")
+    changed = bytearray(built.read_bytes())
+    changed[-1] ^= 1  # the last byte of the archive's comment, or of its length
+    copy.write_bytes(changed)
+    os.utime(copy, ns=(built.stat().st_atime_ns, built.stat().st_mtime_ns))
     assert not is_ours(copy)
     assert not is_ours(copy.rename(tmp_path / "other.fmu"))
     assert not is_ours(tmp_path / "lee2012.fmu")  # which is gone
