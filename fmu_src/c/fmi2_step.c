@@ -1,13 +1,13 @@
 /* FMI functions: stepping, and what belongs to steps that take a while or interpolate, which these FMUs never do. */
 
-/* Warn once per episode which inputs are not finite. Returns the status of the step. */
+/* Warn once per episode which inputs count as missing. Returns the status of the step. */
 static fmi2Status report_missing_inputs(Instance *c) {
     char names[MESSAGE_SIZE];
     size_t n = 0;
     for (int i = 0; i < N_INPUTS && n < sizeof names; i++) {
-        if (isfinite(c->state.values[i])) continue;
+        if (in_range(&VARIABLES[i], c->state.values[i])) continue;
         n += (size_t)snprintf(names + n, sizeof names - n, "%s%s",
-                              n ? ", " : MODEL_NAME ": not finite, treated as missing: ", VARIABLES[i].name);
+                              n ? ", " : MODEL_NAME ": not finite or out of bounds, treated as missing: ", VARIABLES[i].name);
     }
     bool begins = n > 0 && !c->state.missing;
     c->state.missing = n > 0;

@@ -9,13 +9,16 @@ typedef struct {
     double x[N_STATE + 1];
     double start_time;
     double time;                       /* of a continuous block */
-    int64_t next_sample;               /* of a sampled block: this and the next three */
+    int64_t next_sample;               /* of a sampled block: this and the next six */
+    double reached;                    /* end of the last step */
+    double ahead;                      /* samples by which that end is past the instant of the next sample */
     double sampled_from[N_STATE + 1];  /* state before the last sample */
+    int64_t began_anew;                /* the last sample counted as the first one */
     int64_t slowly_changed;            /* the last sample changed more of the state than its first N_FAST */
     double sampled_inputs[N_INPUTS + 1]; /* inputs of the last sample */
     int64_t phase;
     int64_t stale;   /* the outputs do not yet follow the inputs and parameters in force */
-    int64_t missing; /* in an episode of inputs that are not finite */
+    int64_t missing; /* in an episode of inputs that count as missing */
 } State;
 
 typedef struct {

@@ -1,5 +1,8 @@
 /* A sampled block: takes every instant t_k = start_time + k sample_period in [t, t + h) of a step, with the inputs in
-   force, and holds its outputs between. k is a whole number. */
+   force, and holds its outputs between. k is a whole number.
+
+   Its clock counts samples, not seconds: a step that begins where the last one ended, as far as times are told apart
+   there, goes on from there by h / sample_period samples. So it is exact however far from 0 the start lies. */
 
 static double sample_period(Instance *c) { return c->state.values[PERIOD]; }
 
@@ -54,6 +57,17 @@ static void evaluate_next(Instance *c, const double *from, double *x) {
 static void keep_state(State *s) { memcpy(s->sampled_from, s->x, sizeof s->x); }
 #endif
 
+#if BEGINS_ANEW
+/* Whether every number that the last sample reports is finite. */
+static bool is_sound(Instance *c) {
+    double sound = 0.0;
+    const double *arg[N_ARGUMENTS] = {reported_by(c)};
+    double *res[N_RESULTS] = {&sound};
+    block_sound(arg, res, c->integer_work, c->work, 0);
+    return sound != 0.0;
+}
+#endif
+
 static void remember_inputs(State *s) { memcpy(s->sampled_inputs, s->values, N_INPUTS * sizeof(double)); }
 
 /* Instant that the outputs belong to; the start time before the first sample. */
@@ -74,7 +88,16 @@ static void engine_refresh(Instance *c) {
 
 static void engine_initialise(Instance *c) {
     c->state.next_sample = 0;
+    c->state.reached = c->state.start_time;
+    c->state.ahead = 0.0;
     engine_refresh(c);
+}
+
+/* Take this sample for the first one. */
+static void begin(Instance *c) {
+    evaluate_first(c, c->state.x);
+    c->state.slowly_changed = true;
+    c->state.began_anew = true;
 }
 
 static void take_sample(Instance *c) {
@@ -83,25 +106,44 @@ static void take_sample(Instance *c) {
     remember_inputs(s);
     keep_state(s);
     if (s->next_sample == 0) {
-        evaluate_first(c, s->x);
-        s->slowly_changed = true;
+        begin(c);
     } else {
+        s->began_anew = false;
         evaluate_next(c, s->sampled_from, s->x);
     }
+#if BEGINS_ANEW
+    if (!is_sound(c)) {
+        begin(c);
+        reported_by(c)[STATUS_AT] += RESTARTED;
+    }
+#endif
     s->next_sample++;
     stamp(c);
 }
 
+/* Samples by which t is past the instant of the next sample. */
+static double ahead_at(Instance *c, double t) {
+    State *s = &c->state;
+    double rounding = TIME_ROUNDING * fmax(fabs(t), fabs(s->start_time));
+    if (fabs(t - s->reached) <= rounding) return s->ahead;
+    double ahead = (t - s->start_time) / sample_period(c) - (double)s->next_sample;
+    double whole = floor(ahead + 0.5);
+    return fabs(ahead - whole) * sample_period(c) <= rounding ? whole : ahead;
+}
+
 static fmi2Status engine_step(Instance *c, double t, double h) {
     State *s = &c->state;
-    double end = (t + h - s->start_time) / sample_period(c) - CLOCK_TOLERANCE;
-    if (!(fabs(end - (double)s->next_sample) <= LONGEST_STEP)) {
+    double ahead = ahead_at(c, t) + h / sample_period(c);
+    if (!(fabs(ahead) <= LONGEST_STEP)) {
         return refuse(c, "t = %.15g s lies more than %g samples away", t, LONGEST_STEP);
     }
 #if HAS_SOLVER
     State before = *s;
 #endif
-    while ((double)s->next_sample < end) take_sample(c);
+    double due = fmax(0.0, ceil(ahead - CLOCK_TOLERANCE));
+    for (double i = 0; i < due; i++) take_sample(c);
+    s->reached = t + h;
+    s->ahead = ahead - due;
 #if HAS_SOLVER
     if (!all_finite(reported_by(c), N_REPORTED)) {
         *s = before;
@@ -117,7 +159,7 @@ static void engine_derivative(Instance *c, const double *du, double *dy) {
     State *s = &c->state;
     double *res[N_RESULTS] = {dy};
     draw(c, s->next_sample > 0 ? s->next_sample - 1 : 0);
-    if (s->next_sample <= 1) {
+    if (s->next_sample == 0 || s->began_anew) {
         const double *arg[N_ARGUMENTS] = {s->sampled_inputs, parameters_of(c), c->draws, du};
         block_first_derivative(arg, res, c->integer_work, c->work, 0);
     } else {

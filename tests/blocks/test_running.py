@@ -236,6 +236,11 @@ def test_an_impossible_duration_or_step_is_refused(duration: float, step: float)
         simulate(OSCILLATOR, duration, step)
 
 
+def test_a_row_of_more_solver_steps_than_one_can_wait_for_is_refused() -> None:
+    with pytest.raises(ValueError, match=r"oscillator: a step of 2000\.0 s is more than 1e\+06 internal"):
+        simulate(OSCILLATOR, 4000.0, 2000.0)
+
+
 def test_a_simulation_that_diverges_is_refused() -> None:
     """No row after the last finite one: 100 rad/s at 1 s a step is far outside the stability of RK4."""
     with pytest.raises(StepError, match=r"oscillator: not finite at t = .* s; the solver needs a max_step below 1 s"):

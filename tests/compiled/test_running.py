@@ -79,6 +79,15 @@ def test_a_long_record_goes_on_where_a_portion_ends(at_once: None, monkeypatch: 
     assert all(np.array_equal(whole[name], in_portions[name]) for name in whole.values)
 
 
+@needs_compiler
+def test_a_long_simulation_goes_on_where_a_call_ends(at_once: None, monkeypatch: pytest.MonkeyPatch) -> None:
+    """So that it can be interrupted between calls. 51 rows of 20 solver steps, three of them in a call."""
+    whole = running.simulate(BLOCKS["pendulum"], 1.02, 0.02)
+    monkeypatch.setattr(running, "_SOLVER_STEPS", 70)
+    in_calls = running.simulate(BLOCKS["pendulum"], 1.02, 0.02)
+    assert all(np.array_equal(whole[name], in_calls[name]) for name in whole.values)
+
+
 def test_without_a_compiler_the_interpreter_serves_and_says_so_once(
     fresh: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

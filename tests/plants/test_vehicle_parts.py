@@ -66,6 +66,34 @@ def test_a_standing_tyre_is_a_spring_and_does_not_forget() -> None:
     assert np.abs(rate).max() < 1e-90 and damped.tolist() == [0.3, -0.2]  # the guard against 0 / 0
 
 
+def test_sideways_slip_takes_from_the_grip_along_the_wheel_and_the_other_way_round() -> None:
+    """Combined slip: the force points along c times the slip, and both parts together have the size of one alone."""
+    c, C = np.array([19.0, 21.0]), VALUES["tyre_shape"]
+
+    def settled(along: float, across: float) -> np.ndarray:
+        """Grip of a tyre that has rolled at this slip for long: 8 m along a road, 25 times its relaxation length."""
+        rim, grip = 20.0, np.zeros(2)
+        for _ in range(200):
+            grip = grip + 2e-3 * tyre((rim - along * rim, -across * rim), rim, grip, tuple(c))[0]
+        return grip
+
+    alone, both = settled(0.06, 0.0), settled(0.06, 0.08)
+    assert both[0] < 0.75 * alone[0]
+    assert both[1] / both[0] == pytest.approx(c[1] * 0.08 / (c[0] * 0.06), rel=1e-6)
+    V = (np.hypot(20.0 * 0.94, 20.0 * 0.08) + 20.0) / 2  # (3)
+    rho = np.linalg.norm(c * [0.06, 0.08]) * 20.0 / V
+    assert np.linalg.norm(both) == pytest.approx(np.sin(C * np.arctan(rho / C)), rel=1e-6)
+
+
+@pytest.mark.parametrize("speed", [0.0, 0.5, 2.0])
+def test_a_damper_quiets_a_slow_tyre_and_fades_with_speed(speed: float) -> None:
+    """(4), at first order of the slip: 20 ms of the rate at rest, a fifth of that at 2 m/s."""
+    slow = 1e-4 * np.array([1.0, -2.0])
+    rate, damped = tyre((speed - slow[0], -slow[1]), speed, (0.1, 0.2), (19.0, 21.0))
+    assert damped - [0.1, 0.2] == pytest.approx(rate * 0.02 / (1 + speed**2), rel=1e-3)  # V is speed to 1e-4
+    assert np.abs(rate).min() > 1e-3
+
+
 def test_no_grip_leaves_the_friction_circle_and_the_rate_is_bounded() -> None:
     """At any velocity, from any grip inside; c V / sigma would be some 5000 / s with locked wheels at 70 m/s."""
     rng = np.random.default_rng(2)

@@ -80,3 +80,38 @@ def test_two_recordings_in_one_file_are_refused() -> None:
     with pytest.raises(ClockError, match="split the recording") as caught:
         sample_clock(time)
     assert caught.value.row == 1000
+
+
+@pytest.mark.parametrize(
+    ("stamps", "fault"),
+    [
+        ([0.0, 0.01, 0.01, 0.02, 0.03], r"^0.01 s is repeated; time must increase"),
+        ([0.0, 0.01, 0.005, 0.02, 0.03], r"^0.005 s follows 0.01 s; time must increase"),
+    ],
+)
+def test_a_stamp_that_does_not_increase_is_refused_with_its_row(stamps: list[float], fault: str) -> None:
+    with pytest.raises(ClockError, match=fault) as caught:
+        sample_clock(np.array(stamps))
+    assert caught.value.row == 2
+
+
+def test_every_stamp_twice_is_no_clock() -> None:
+    with pytest.raises(ClockError, match="is repeated") as caught:
+        sample_clock(np.repeat(0.01 * ticks(), 2))
+    assert caught.value.row == 1
+
+
+@pytest.mark.parametrize("rate", [100.0, 120.0, 60.0, 400.0, 285.7])
+@pytest.mark.parametrize("n", [30, 3000])
+def test_stamps_that_count_from_1970_give_the_clock_of_stamps_that_count_from_zero(n: int, rate: float) -> None:
+    """There a double moves on in steps of 0.24 us; the plainest number that this allows is the one that was meant."""
+    expected, actual = sample_clock(ticks(n) / rate), sample_clock(1.7e9 + ticks(n) / rate)
+    assert actual[0] == expected[0]
+    assert np.array_equal(actual[1], expected[1])
+
+
+def test_a_period_without_a_plain_number_keeps_its_digits() -> None:
+    """Only what the rounding of the stamps leaves open is chosen plain."""
+    period = 0.0034940600978
+    assert sample_clock(period * ticks())[0] == pytest.approx(period, rel=1e-12)
+    assert sample_clock(1.7e9 + period * ticks())[0] == pytest.approx(period, abs=2.4e-7 / 2999)

@@ -242,3 +242,28 @@ class TestDevice:
 
 def test_there_are_device_files():
     assert {file.stem for file in DEVICES} >= {"mtx", "mtw", "mti_g_700", "mpu9150"}
+
+
+@pytest.mark.parametrize("resolution", [5e-324, 1e-310, 1e-30])
+def test_a_resolution_finer_than_numbers_are_changes_nothing(resolution: float):
+    """1 / 5e-324 is infinite. 1e-30: every number is a whole multiple of it as far as a double can tell."""
+    ideal = np.array([[1.0, -0.3, 0.0], [1e3, -1e-5, 0.1]])
+    y = run(BLOCK, {"angular_velocity": ideal}, {"gyro_resolution": resolution})["gyro"]
+    assert np.array_equal(y, ideal)
+
+
+def test_a_reading_stays_within_the_bounds_that_estimators_take_it_in():
+    """Whatever the ideal signal, bias, range and resolution: beyond them it would count as missing."""
+    high = np.full((2, 3), 1e9)
+    for name, ideal in (("gyro", "angular_velocity"), ("accel", "specific_force"), ("mag", "magnetic_field")):
+        limit = next(s.maximum for s in BLOCK.outputs if s.name == name)
+        coarse = 0.6 * limit  # the limit is nearer to two steps of it than to one
+        for parameters in (
+            {},
+            {f"{name}_bias": limit},
+            {f"{name}_resolution": coarse},
+            {f"{name}_noise_density": limit},
+        ):
+            for sign in (1, -1):
+                y = run(BLOCK, {ideal: sign * high}, parameters)[name]
+                assert np.array_equal(np.abs(y), np.full((2, 3), limit)), parameters

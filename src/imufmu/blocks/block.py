@@ -6,6 +6,9 @@ Two kinds. A **sampled** block (IMU, estimator) advances at multiples of its par
     step(x, u, p) -> state        every further sample
     output(x, u, p) -> outputs and locals, after either
 
+A sampled block with an output ``status`` never stays without finite numbers: where a step reports one that is not
+finite, the sample counts as the first one, and ``status`` has the flag RESTARTED.
+
 What is costly and rarely due (a covariance update, say) may stand apart, declared by both of
 
     slow_due(x, u, p) -> number       asked after every ``step``, with its result: which slow step is due; 0 none
@@ -21,12 +24,13 @@ A **continuous** block (plant) is integrated by RK4 with steps no longer than it
 
 x, u, p are namespaces of CasADi SX expressions with the declared names and shapes; functions return dicts by name.
 
-Inputs never carry NaN or infinity into the equations. An input with a non-finite element counts as missing: the block
-keeps the last finite vector (at first the start value). For an input ``gyro`` a sampled block sees
+Inputs never carry NaN or infinity into the equations, and those of a block with a ``status`` nothing outside their
+declared bounds, which no sensor reads. An input with such an element counts as missing: the block keeps the last vector
+that was not (at first the start value). For an input ``gyro`` a sampled block sees
 
-    u.gyro            this sample, or the last finite one
+    u.gyro            this sample, or the last one that was not missing
     u.gyro_previous   the same, one sample ago
-    u.gyro_missing    1 where this sample was not finite, else 0
+    u.gyro_missing    1 where this sample is missing, else 0
 
 ``u.normal`` holds the standard normal draws of this sample, where a sampled block declares any. A continuous block has
 draws at its start only: ``p.normal`` in ``initial``.
@@ -44,18 +48,16 @@ import casadi as ca
 import numpy as np
 
 from . import vocabulary
-from .expressions import all_of, function, namespace, shaped
+from .expressions import all_of, function, is_finite, is_within, namespace, shaped
 from .noise import standard_normal
+from .parameter_values import ParameterError, flat_parameters, parameter_problems
+from .restart import or_anew
 from .signals import DeclarationError, Parameter, Signal, State, total_size
 from .slow_parts import SlowParts, one_of
 
-LARGEST_INPUT = 1e30  # larger magnitudes count as not finite: in a covariance their powers would overflow
+LARGEST_INPUT = 1e30  # larger magnitudes count as missing whatever is declared: powers of them would overflow
 
 Expressions = Mapping[str, Any]
-
-
-class ParameterError(ValueError):
-    """Parameter values out of bounds, or unknown; the message names each."""
 
 
 @dataclass(frozen=True)
@@ -114,9 +116,18 @@ class Block:
         return False
 
     @property
+    def has_status(self) -> bool:
+        """Whether it can say that an input is missing, or that it began anew."""
+        return vocabulary.STATUS.name in (signal.name for signal in self.outputs)
+
+    @property
     def reported(self) -> tuple[Signal, ...]:
         """Every signal the block reports: outputs, then locals."""
         return (*self.outputs, *self.locals)
+
+    def place_of(self, name: str) -> int:
+        """Where a reported signal begins in the vector of all of them."""
+        return total_size(self.reported[: [signal.name for signal in self.reported].index(name)])
 
     @cached_property
     def variables(self) -> tuple[Variable, ...]:
@@ -141,7 +152,7 @@ class Block:
 
     @cached_property
     def held_state(self) -> tuple[State, ...]:
-        """The block's own state, then the last finite value of every input."""
+        """The block's own state, then the last value of every input that was not missing."""
         return (*self.state, *(State(f"held_{s.name}", s.shape) for s in self.inputs))
 
     def start_vector(self, signals: Sequence[Signal]) -> np.ndarray:
@@ -153,26 +164,7 @@ class Block:
 
         Raises ParameterError naming every unknown name, wrong size and value out of bounds.
         """
-        p = self.start_vector(self.parameters)
-        places = {v.name: slice(v.index, v.index + 1) for v in self.variables if v.group == "parameter"}
-        first = 0
-        for parameter in self.parameters:
-            places[parameter.name] = slice(first, first + parameter.size)
-            first += parameter.size
-        problems = []
-        for name, value in (values or {}).items():
-            if name not in places:
-                problems.append(f"{name}: unknown; {self.name} has {', '.join(q.name for q in self.parameters)}")
-                continue
-            try:
-                flat = np.asarray(value, dtype=float).reshape(-1)
-            except (TypeError, ValueError):
-                problems.append(f"{name}: {value!r} is not a number")
-                continue
-            if flat.size not in (1, places[name].stop - places[name].start):
-                problems.append(f"{name}: {flat.size} values for {places[name].stop - places[name].start} elements")
-                continue
-            p[places[name]] = flat
+        p, problems = flat_parameters(self.parameters, values or {}, self.name)
         problems += self.parameter_problems(p)
         if problems:
             raise ParameterError(f"{self.name}: " + "; ".join(problems))
@@ -180,36 +172,30 @@ class Block:
 
     def parameter_problems(self, p: np.ndarray) -> list[str]:
         """One line per element of the flat parameter vector that is out of bounds or of the wrong kind."""
-        problems = []
-        for variable in self.variables:
-            if variable.group != "parameter":
-                continue
-            value, declared = p[variable.index], variable.signal
-            if not declared.minimum <= value <= declared.maximum:
-                unit = "" if declared.unit == "1" else f" {declared.unit}"
-                problems.append(
-                    f"{variable.name} = {value:g}{unit} is outside [{declared.minimum:g}, {declared.maximum:g}]{unit}"
-                )
-            elif isinstance(declared, Parameter) and declared.kind != "real" and value != round(value):
-                problems.append(f"{variable.name} = {value:g} is not a whole number")
-        return problems
+        return parameter_problems(self.parameters, p)
 
     def _symbols(self, name: str, items: Sequence[Signal | State]) -> Any:
         return ca.SX.sym(name, total_size(items))
 
     def _with_held_inputs(self, raw: Any, held: Any) -> tuple[SimpleNamespace, list[Any]]:
-        """Namespace of finite inputs, and their flat values for the next step."""
+        """Namespace of inputs without those that are missing, and their flat values for the next step."""
         u, values, first = SimpleNamespace(), [], 0
         for signal in self.inputs:
             part = slice(first, first + signal.size)
-            finite = all_of(ca.fabs(raw[part]) <= LARGEST_INPUT)
-            value = ca.if_else(finite, raw[part], held[part])
+            there = all_of(is_within(raw[part], *self.bounds_of(signal)))
+            value = ca.if_else(there, raw[part], held[part])
             setattr(u, signal.name, shaped(value, signal.shape))
             setattr(u, f"{signal.name}_previous", shaped(held[part], signal.shape))
-            setattr(u, f"{signal.name}_missing", 1 - finite)
+            setattr(u, f"{signal.name}_missing", 1 - there)
             values.append(value)
             first += signal.size
         return u, values
+
+    def bounds_of(self, signal: Signal) -> tuple[float, float]:
+        """Least and largest value of an input that do not make it count as missing."""
+        if not self.has_status:
+            return -LARGEST_INPUT, LARGEST_INPUT
+        return max(signal.minimum, -LARGEST_INPUT), min(signal.maximum, LARGEST_INPUT)
 
     def _flatten(self, what: str, items: Sequence[Signal | State], values: Expressions) -> Any:
         """Flat column of the named expressions, checked against the declaration."""
@@ -255,12 +241,17 @@ class SampledBlock(Block):
 
     @cached_property
     def next_function(self) -> Any:
-        """CasADi Function (x, u, p, w) -> (x, y): every further sample.
+        """CasADi Function (x, u, p, w) -> (x, y): every further sample. It begins anew where it would not be finite."""
+        return or_anew(self) if self.begins_anew else self.following_function
+
+    @cached_property
+    def following_function(self) -> Any:
+        """CasADi Function (x, u, p, w) -> (x, y): every further sample, finite or not.
 
         One list of instructions (SX); with slow steps a graph (MX) of such lists, some of them behind a switch.
         """
         if self.slow_parts:
-            return self.slow_parts.in_a_row(f"{self.name}_next")
+            return self.slow_parts.in_a_row(f"{self.name}_following")
         u, p, w = self._arguments()
         x_all = self._symbols("x", self.held_state)
         n = total_size(self.state)
@@ -269,7 +260,18 @@ class SampledBlock(Block):
         x = self._flatten("step", self.state, self.step(state, inputs, namespace(self.parameters, p)))
         y = self._outputs(x, inputs, p)
         result = [ca.vertcat(x, *finite), y]
-        return function(f"{self.name}_next", [x_all, u, p, w], result, ["x", "u", "p", "w"], ["x_next", "y"])
+        return function(f"{self.name}_following", [x_all, u, p, w], result, ["x", "u", "p", "w"], ["x_next", "y"])
+
+    @property
+    def begins_anew(self) -> bool:
+        """Whether a sample whose numbers are not finite counts as the first one: where the block can say so."""
+        return self.has_status
+
+    @cached_property
+    def sound_function(self) -> Any:
+        """CasADi Function (y) -> (1 where every number that a sample reports is finite, else 0)."""
+        y = self._symbols("y", self.reported)
+        return function(f"{self.name}_sound", [y], [is_finite(y)])
 
     @cached_property
     def slow_parts(self) -> SlowParts | None:
@@ -295,9 +297,9 @@ class SampledBlock(Block):
         return SlowParts(step, one_of(f"{self.name}_slow", choice), self._report(x, held, u, p, w))
 
     def _report(self, x: Any, held: Any, u: Any, p: Any, w: Any) -> Any:
-        """Function ``report`` of SlowParts: it is given the finite inputs."""
+        """Function ``report`` of SlowParts: it is given the inputs without those that are missing."""
         inputs, _ = self._inputs(u, held, w)
-        given = self._symbols("finite", self.inputs)
+        given = self._symbols("given", self.inputs)
         vars(inputs).update(vars(namespace(self.inputs, given)))
         arguments = [ca.vertcat(x, given), held, u, p, w]
         return function(f"{self.name}_report", arguments, [self._outputs(x, inputs, p)])

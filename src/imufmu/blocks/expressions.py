@@ -11,6 +11,8 @@ import casadi as ca
 
 from .signals import Shape, Signal, State
 
+LARGEST_SQUARE = 1e300
+
 
 def function(name: str, *parts: Any) -> Any:
     """CasADi Function that computes equal terms once."""
@@ -20,6 +22,21 @@ def function(name: str, *parts: Any) -> Any:
 def all_of(conditions: Any) -> Any:
     """1 where every element of a column is not 0."""
     return reduce(ca.logic_and, ca.vertsplit(conditions))
+
+
+def is_within(column: Any, least: float, largest: float) -> Any:
+    """1 for every element within these bounds: no comparison holds for NaN."""
+    if least == -largest:
+        return ca.fabs(column) <= largest
+    return ca.logic_and(column >= least, column <= largest)
+
+
+def is_finite(column: Any) -> Any:
+    """1 where every element of a column is finite, and the sum of their squares not beyond LARGEST_SQUARE."""
+    squares = [element**2 for element in ca.vertsplit(column)]
+    while len(squares) > 1:  # in pairs: sums that do not wait for each other
+        squares = [a + b for a, b in zip(squares[::2], squares[1::2], strict=False)] + squares[len(squares) & ~1 :]
+    return squares[0] <= LARGEST_SQUARE if squares else 1
 
 
 def shaped(flat: Any, shape: Shape) -> Any:

@@ -3,12 +3,18 @@
 Times are seconds. A sampled block processes every instant t_k = start_time + k sample_period in [t, t + h) of a step
 (t, h) with the inputs in force and holds its outputs between; k is a whole number. A continuous block integrates over
 [t, t + h] with the inputs held and reports its outputs at the end, with the inputs in force there.
+
+The clock of a sampled block counts samples, not seconds: a step that begins where the last one ended, as far as times
+are told apart there, goes on from there by h / sample_period samples. So a start at 1.7e9 s, where a double moves on in
+steps of 0.2 us, gives the samples of a start at 0.
 """
 
 from __future__ import annotations
 
+import hashlib
+import json
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -18,12 +24,17 @@ from .noise import draws
 from .signals import total_size
 
 CLOCK_TOLERANCE = 1e-6  # of a sample: a step that ends this little after an instant does not contain it
-LONGEST_STEP = 10**8  # samples or solver steps in one step; more is taken for a wrong unit or a broken time
+TIME_ROUNDING = 2.0**-50  # of a time, relative: what two ways to compute it may differ by
+LONGEST_STEP = 10**6  # samples or solver steps in one step; more is taken for a wrong unit or a broken time
 _DRAWS_AHEAD = 256  # samples whose noise is drawn in one go
 
 
 class StepError(ValueError):
     """An impossible step; nothing has changed."""
+
+
+class StateError(ValueError):
+    """A saved state that is not one of this block, or is not as it was saved; nothing has changed."""
 
 
 def buffered(function: Any, arguments: tuple[np.ndarray, ...], results: tuple[np.ndarray, ...]) -> Callable[[], None]:
@@ -53,6 +64,7 @@ class Instance:
         self.u, self.p, self.y = np.split(self.values, [len(inputs), len(inputs) + len(parameters)])
         self.x = np.zeros(total_size(block.held_state))
         self.start_time = 0.0
+        self._input_bounds = [block.bounds_of(signal) for signal in block.inputs for _ in range(signal.size)]
 
     def initialise(self, start_time: float) -> None:
         """Check the parameters, compute the initial state and outputs. Raises ParameterError."""
@@ -62,6 +74,11 @@ class Instance:
         if problems:
             raise ParameterError(f"{self.block.name}: " + "; ".join(problems))
         self.start_time = start_time
+
+    def missing_inputs(self) -> list[str]:
+        """Names of the inputs that count as missing."""
+        bounded = zip(self.block.variables, self.u.tolist(), self._input_bounds, strict=False)
+        return [variable.name for variable, value, (least, largest) in bounded if not least <= value <= largest]
 
     def do_step(self, t: float, h: float) -> None:
         """Step from t to t + h. Raises StepError, state unchanged, if that is impossible."""
@@ -77,17 +94,42 @@ class Instance:
 
     def get_state(self) -> dict[str, Any]:
         """Everything that determines the future, as JSON-able values; floats survive bit for bit."""
+        content = self._content()
+        return content | {"digest": _digest(content)}
+
+    def set_state(self, state: Mapping[str, Any]) -> None:
+        """Return to a state from ``get_state`` of an instance of the same block. Raises StateError."""
+        expected = self._content()
+        content = {name: state[name] for name in expected if name in state}
+        fits = content.keys() == expected.keys() and all(_alike(content[name], expected[name]) for name in expected)
+        if not fits or state.get("digest") != _digest(content):
+            raise StateError(f"{self.block.name}: not a state of this block, or changed since it was saved")
+        self._restore(content)
+
+    def _content(self) -> dict[str, Any]:
         return {
+            "block": self.block.name,
             "values": self.values.tolist(),
             "x": self.x.tolist(),
-            "start_time": self.start_time,
+            "start_time": float(self.start_time),
         }
 
-    def set_state(self, state: dict[str, Any]) -> None:
-        """Return to a state from ``get_state`` of an instance of the same block."""
-        self.values[:] = state["values"]
-        self.x[:] = state["x"]
-        self.start_time = state["start_time"]
+    def _restore(self, content: Mapping[str, Any]) -> None:
+        self.values[:] = content["values"]
+        self.x[:] = content["x"]
+        self.start_time = content["start_time"]
+
+
+def _alike(value: Any, other: Any) -> bool:
+    """Whether a value can stand for another: numbers for numbers, as many of them; a word for itself."""
+    if isinstance(other, list):
+        return isinstance(value, list) and len(value) == len(other) and all(isinstance(v, int | float) for v in value)
+    return value == other if isinstance(other, str) else isinstance(value, int | float)
+
+
+def _digest(content: Mapping[str, Any]) -> str:
+    """Of every bit of a state: -0.0 is not 0.0."""
+    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()[:32]
 
 
 class SampledInstance(Instance):
@@ -98,6 +140,8 @@ class SampledInstance(Instance):
     def __init__(self, block: SampledBlock) -> None:
         super().__init__(block)
         self.next_sample = 0
+        self._reached = 0.0  # s, end of the last step
+        self._ahead = 0.0  # samples by which that end is past the instant of the next sample
         self._w = np.full(block.normals, 0.5)
         self._draws = np.zeros((0, block.normals))
         self._draws_from: tuple[list[tuple[float, int]], int] = ([], 0)  # streams and first sample of those at hand
@@ -119,6 +163,7 @@ class SampledInstance(Instance):
     def initialise(self, start_time: float) -> None:
         super().initialise(start_time)
         self.next_sample = 0
+        self._reached, self._ahead = start_time, 0.0
         self.refresh()
 
     def refresh(self) -> None:
@@ -138,16 +183,28 @@ class SampledInstance(Instance):
         self.next_sample += 1
 
     def do_step(self, t: float, h: float) -> None:
-        self._check_step(t, h, self.sample_period)
-        end = (t + h - self.start_time) / self.sample_period - CLOCK_TOLERANCE
-        if not abs(end - self.next_sample) <= LONGEST_STEP:
+        period = self.sample_period
+        self._check_step(t, h, period)
+        ahead = self._ahead_at(t) + h / period
+        if not abs(ahead) <= LONGEST_STEP:
             raise StepError(f"{self.block.name}: t = {t:.15g} s lies more than {LONGEST_STEP:g} samples away")
-        before = self.get_state() if self.block.has_solver else None
-        for _ in range(self.next_sample, math.ceil(end)):
+        before = self._content() if self.block.has_solver else None
+        due = max(0, math.ceil(ahead - CLOCK_TOLERANCE))
+        for _ in range(due):
             self.sample()
+        self._reached, self._ahead = t + h, ahead - due
         if before and not np.isfinite(self.y).all():
-            self.set_state(before)
-            raise StepError(chain_diverged(self.block, t + h, self.sample_period))
+            self._restore(before)
+            raise StepError(chain_diverged(self.block, t + h, period))
+
+    def _ahead_at(self, t: float) -> float:
+        """Samples by which t (s) is past the instant of the next sample."""
+        rounding = TIME_ROUNDING * max(abs(t), abs(self.start_time))
+        if abs(t - self._reached) <= rounding:
+            return self._ahead
+        ahead = (t - self.start_time) / self.sample_period - self.next_sample
+        whole = float(np.floor(ahead + 0.5))
+        return whole if abs(ahead - whole) * self.sample_period <= rounding else ahead
 
     def _draw(self, k: int) -> None:
         if not self.block.normals:
@@ -158,12 +215,13 @@ class SampledInstance(Instance):
             self._draws_from = (streams, first)
         self._w[:] = self._draws[k - first]
 
-    def get_state(self) -> dict[str, Any]:
-        return super().get_state() | {"next_sample": self.next_sample}
+    def _content(self) -> dict[str, Any]:
+        clock = {"next_sample": self.next_sample, "reached": float(self._reached), "ahead": float(self._ahead)}
+        return super()._content() | clock
 
-    def set_state(self, state: dict[str, Any]) -> None:
-        super().set_state(state)
-        self.next_sample = state["next_sample"]
+    def _restore(self, content: Mapping[str, Any]) -> None:
+        super()._restore(content)
+        self.next_sample, self._reached, self._ahead = content["next_sample"], content["reached"], content["ahead"]
 
 
 class ContinuousInstance(Instance):
@@ -216,12 +274,12 @@ class ContinuousInstance(Instance):
             self.refresh()
             raise StepError(diverged(self.block, t + h, max_step))
 
-    def get_state(self) -> dict[str, Any]:
-        return super().get_state() | {"time": self.time}
+    def _content(self) -> dict[str, Any]:
+        return super()._content() | {"time": self.time}
 
-    def set_state(self, state: dict[str, Any]) -> None:
-        super().set_state(state)
-        self._t[0] = state["time"]
+    def _restore(self, content: Mapping[str, Any]) -> None:
+        super()._restore(content)
+        self._t[0] = content["time"]
 
 
 def solver_steps(h: float, max_step: float) -> int:

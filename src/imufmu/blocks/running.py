@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from .block import Block, ContinuousBlock, SampledBlock
-from .instance import SampledInstance, StepError, chain_diverged, diverged, solver_steps
+from .instance import LONGEST_STEP, SampledInstance, StepError, chain_diverged, diverged, solver_steps
 from .noise import draws
 from .signals import Signal, State, total_size
 
@@ -136,6 +136,8 @@ def simulate(
     u = _input_rows(block, inputs or {}, n + 1)
     p = block.parameter_vector(parameters)
     per_row = solver_steps(step, p[_names(block).index("max_step")])
+    if per_row > LONGEST_STEP:
+        raise ValueError(f"{block.name}: a step of {step} s is more than {LONGEST_STEP:g} internal steps")
     time = start_time + np.arange(n + 1) * step
     x = block.initial_function(p, draws(_streams(block, p), 0, 1)[0]).full().ravel()
     states, y = solved(block, x, u, p, time, step, per_row)

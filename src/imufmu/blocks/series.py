@@ -121,6 +121,14 @@ class Series(SampledBlock):
         return (period, *(replace(vocabulary.SEED, name=name) for name, _ in self.seeds))
 
     @property
+    def begins_anew(self) -> bool:
+        """Not as a whole: each of its blocks does so by itself."""
+        return False
+
+    def bounds_of(self, signal: Signal) -> tuple[float, float]:
+        return next(block.bounds_of(given) for given, block in _open_inputs(self.blocks) if given.name == signal.name)
+
+    @property
     def has_solver(self) -> bool:
         return isinstance(self.blocks[0], ContinuousBlock)
 
@@ -153,7 +161,7 @@ class Series(SampledBlock):
         )
 
     @cached_property
-    def next_function(self) -> Any:
+    def following_function(self) -> Any:
         """CasADi Function (x, u, p, w) -> (x, y), as of any sampled block."""
         u, p, w = self._mx_arguments()
         sizes = [total_size(block.held_state) for block in self.blocks]

@@ -19,9 +19,16 @@ MID_EUROPE = (1.4, 20.1, -44.9)
 
 _XYZ = (3,)
 _AT_REST = (0.0, 0.0, GRAVITY)
+# Of what a plant may do to an ideal IMU.
 _RATE_LIMIT = 1e3  # rad/s
 _FORCE_LIMIT = 1e5  # m/s2
 _FIELD_LIMIT = 1e6  # uT
+
+# Of what real sensors read, with room; a reading beyond counts as missing. Gyroscopes end at 350 rad/s, accelerometers
+# that fit into an IMU at 400 g, magnetometers at 50 mT.
+_GYRO_LIMIT = 1e3  # rad/s
+_ACCEL_LIMIT = 5e3  # m/s2
+_MAG_LIMIT = 1e5  # uT
 
 
 def _xyz(name: str, unit: str, limit: float, nominal: float, description: str, start: Values = 0.0) -> Signal:
@@ -36,9 +43,9 @@ SPECIFIC_FORCE = _xyz(
 MAGNETIC_FIELD = _xyz("magnetic_field", "uT", _FIELD_LIMIT, 50.0, "Magnetic flux density at the mounting point, in S")
 
 # Readings (IMU out, estimator in).
-GYRO = _xyz("gyro", "rad/s", _RATE_LIMIT, 1.0, "Gyroscope reading, sensor frame")
-ACCEL = _xyz("accel", "m/s2", _FORCE_LIMIT, 10.0, "Accelerometer reading (specific force), sensor frame", _AT_REST)
-MAG = _xyz("mag", "uT", _FIELD_LIMIT, 50.0, "Magnetometer reading, sensor frame")
+GYRO = _xyz("gyro", "rad/s", _GYRO_LIMIT, 1.0, "Gyroscope reading, sensor frame")
+ACCEL = _xyz("accel", "m/s2", _ACCEL_LIMIT, 10.0, "Accelerometer reading (specific force), sensor frame", _AT_REST)
+MAG = _xyz("mag", "uT", _MAG_LIMIT, 50.0, "Magnetometer reading, sensor frame")
 
 # Attitude (plant out as truth, estimator out as estimate).
 ROLL = Signal("roll", "rad", "Z-Y-X Euler angle about the sensor's x axis", -pi, pi)
@@ -68,7 +75,14 @@ def skeleton(points: int) -> Signal:
 
 # What an estimator says about itself.
 TILT_STD = Signal("tilt_std", "rad", "One-sigma angle between estimated and true vertical", 0.0, 1e3, nominal=0.01)
-STATUS = Signal("status", "1", "0 ok, else the sum of imufmu.vocabulary.Status flags", 0.0, 1023.0)
+STATUS = Signal(
+    "status",
+    "1",
+    "0 ok, else the sum of: 1 gyroscope, 2 accelerometer, 4 magnetometer missing; 8 accelerometer, 16 magnetometer "
+    "rejected; 32 not initialised; 64 begun anew",
+    0.0,
+    1023.0,
+)
 
 # Every sampled block has these two; the framework adds them.
 SAMPLE_TIME = Signal("sample_time", "s", "Instant of the sample that the outputs belong to", -1e12, 1e12)
@@ -91,11 +105,15 @@ IDEAL_IMU = (ANGULAR_VELOCITY, SPECIFIC_FORCE, MAGNETIC_FIELD)
 
 
 class Status(IntFlag):
-    """Flags in the output ``status`` of an estimator; 0 means every input was used."""
+    """Flags in the output ``status`` of an estimator; 0 means every input was used.
 
-    GYRO_MISSING = 1  # not finite: the last finite sample was held
-    ACCEL_MISSING = 2  # not finite: predicted without it
-    MAG_MISSING = 4  # not finite: predicted without it
+    Missing is a reading that is not finite, or outside its declared bounds.
+    """
+
+    GYRO_MISSING = 1  # the last sample that was not missing was held
+    ACCEL_MISSING = 2  # predicted without it
+    MAG_MISSING = 4  # predicted without it
     ACCEL_REJECTED = 8  # the filter's own test took it for motion
     MAG_REJECTED = 16  # the filter's own test took it for a disturbance
     NOT_INITIALISED = 32  # no usable accelerometer sample yet: attitude is the start value
+    RESTARTED = 64  # its numbers were not finite any more: it began anew with this sample

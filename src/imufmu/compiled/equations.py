@@ -9,16 +9,22 @@ import casadi as ca
 
 from ..blocks.block import Block, ContinuousBlock, SampledBlock
 from ..blocks.signals import total_size
+from ..blocks.vocabulary import Status
 
 _STYLE: dict[str, Any] = {"with_header": False, "casadi_real": "double", "casadi_int": "int", "indent": 4}
 
 
 def functions_of(block: Block) -> dict[str, Any]:
-    """CasADi Functions by the name that C calls them by: everything a run needs."""
+    """CasADi Functions by the name that C calls them by: everything a run needs.
+
+    C itself lets a block begin anew where ``block_sound`` says that its numbers are not finite.
+    """
     if isinstance(block, SampledBlock):
         parts = block.slow_parts
         in_place = {"block_step": parts.step, "block_slow": parts.slow, "block_report": parts.report} if parts else {}
-        return {"block_first": block.first_function, **(in_place or {"block_next": block.next_function})}
+        following = in_place or {"block_next": block.following_function}
+        sound = {"block_sound": block.sound_function} if block.begins_anew else {}
+        return {"block_first": block.first_function, **following, **sound}
     assert isinstance(block, ContinuousBlock)
     return {
         "block_initial": block.initial_function,
@@ -32,15 +38,16 @@ def derivatives_of(block: Block) -> dict[str, Any]:
     if isinstance(block, SampledBlock):
         return {
             "block_first_derivative": output_derivative(block, block.first_function),
-            "block_next_derivative": output_derivative(block, block.next_function),
+            "block_next_derivative": output_derivative(block, block.following_function),
         }
     assert isinstance(block, ContinuousBlock)
     return {"block_output_derivative": output_derivative(block, block.output_function)}
 
 
 def sizes(block: Block, functions: dict[str, Any]) -> dict[str, int]:
-    """Lengths of vectors and of the room that the functions need, by their names in C."""
+    """Lengths of vectors, the room that the functions need, the place of ``status``: by their names in C."""
     needs = list(functions.values())
+    begins_anew = isinstance(block, SampledBlock) and block.begins_anew
     return {
         "N_INPUTS": total_size(block.inputs),
         "N_PARAMETERS": total_size(block.parameters),
@@ -48,6 +55,9 @@ def sizes(block: Block, functions: dict[str, Any]) -> dict[str, int]:
         "N_REPORTED": total_size(block.reported),
         "N_STATE": total_size(block.held_state),
         "N_HELD": total_size(block.inputs),  # the last of the state
+        "BEGINS_ANEW": int(begins_anew),
+        "STATUS_AT": block.place_of("status") if begins_anew else 0,  # in the reported signals
+        "RESTARTED": int(Status.RESTARTED),
         "SLOW_STEPS": int("block_slow" in functions),
         "N_FAST": functions["block_step"].numel_out(0) if "block_step" in functions else total_size(block.state),
         "N_NORMALS": block.normals,

@@ -14,6 +14,8 @@ from ..blocks.running import Trajectory, reached_at
 from ..blocks.signals import total_size
 from .library import compiled, pointer
 
+_SOLVER_STEPS = 10**6  # in one call, which nothing interrupts
+
 
 def run(
     block: SampledBlock,
@@ -64,7 +66,9 @@ def _solved(
     u, time, reached = map(np.ascontiguousarray, (u, time, reached_at(time, step)))
     states, y = np.empty((n + 1, len(x))), np.empty((n + 1, total_size(block.reported)))
     states[0] = x
-    h = c_double(step / per_row)
-    library.block_rows(c_longlong(n), c_longlong(per_row), *map(pointer, (states, u, p, time)), h)
+    h, rows = c_double(step / per_row), max(1, _SOLVER_STEPS // per_row)
+    for first in range(0, n, rows):
+        count, parts = min(rows, n - first), (states[first:], u[first:], p, time[first:])
+        library.block_rows(c_longlong(count), c_longlong(per_row), *map(pointer, parts), h)
     library.block_outputs(c_longlong(n + 1), *map(pointer, (states, u, p, reached, y)))
     return states, y

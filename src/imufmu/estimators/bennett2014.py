@@ -51,8 +51,8 @@ needs no inverse; (23) is computed for one triangle of P: with rounding errors t
 diverges. s_3 = atan2(g_x, -g_y) has the zero of theta_1 + theta_2, which (1) has not, and its innovation is wrapped.
 (1) and (8) contradict each other in the sign of the accelerometer; (8) is taken. The filter starts at once from the
 angles and biases given. The paper's two preparations of the whole record are options: ``median``, then two samples
-late, and the biases from a rest at the start, ``rest_time``. A gyroscope sample that is not finite is held, an
-accelerometer sample that is not finite or points nowhere is predicted over.
+late, and the biases from a rest at the start, ``rest_time``. A missing gyroscope sample is held, an
+accelerometer sample that is missing or points nowhere is predicted over.
 
 [1] Bennett, Jafari, Gans, Motion Based Acceleration Correction for Improved Sensor Orientation Estimates, BSN 2014
 """

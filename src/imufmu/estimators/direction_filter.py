@@ -40,6 +40,7 @@ import casadi as ca
 
 from ..blocks.rotations import root, skew, unit
 from ..blocks.signals import integer, real
+from . import kalman
 
 NO_DIRECTION = 1e-6  # of the usual magnitude: a first sample shorter than this points nowhere
 LARGEST_TRACE = 1e6  # of P: a longer prediction without update would overflow; nothing is known by then
@@ -68,21 +69,22 @@ def predict(d: Any, P: Any, gyro: Any, p: SimpleNamespace) -> tuple[Any, Any]:
     dt = p.sample_period
     Phi = ca.SX.eye(3) - dt * skew(gyro)  # (12)
     Q = -(dt**2) * p.sigma_g2 * skew(d) @ skew(d)  # (15)
-    P = Phi @ P @ Phi.T + Q  # (25)
-    return Phi @ d, P / ca.fmax(1, ca.trace(P) / LARGEST_TRACE)  # (24)
+    P = kalman.predicted(Phi @ P @ Phi.T + Q)  # (25)
+    unknown = LARGEST_TRACE / 3 * ca.SX.eye(3)  # scaled down instead, P would lose its small eigenvalues
+    return Phi @ d, ca.if_else(ca.trace(P) > LARGEST_TRACE, unknown, P)  # (24)
 
 
 def update(d: Any, P: Any, z: Any, M: Any, scale: Any, accepted: Any) -> tuple[Any, Any, Any]:
     """A posteriori direction (not normalised), covariance, innovation; direction and covariance as before if not
     accepted.
 
-    z (3,): measurement of scale * d. M: scalar, the variance of each of its elements.
+    z (3,): measurement of scale * d. M: scalar, the variance of each of its elements: they correct one after the other,
+    with the numbers of (26) to (28), without an inverse and without leaving the symmetric positive matrices.
     """
     innovation = z - scale * d
-    inverse = ca.inv_minor(scale**2 * P + M * ca.SX.eye(3))
-    K = ca.if_else(accepted, scale * P @ inverse, 0)  # (26), H = scale I
-    I_KH = ca.if_else(accepted, M * inverse, ca.SX.eye(3))  # I - K H, without its cancellation where H P H' >> M
-    return d + K @ innovation, I_KH @ P, innovation  # (27), (28)
+    for axis in range(3):
+        d, P = kalman.update_by_state(d, P, axis, scale, z[axis], M, accepted)  # (26) to (28), H = scale I
+    return d, P, innovation
 
 
 def normalised(d: Any, switch: Any) -> Any:

@@ -12,12 +12,21 @@ from typing import Any
 
 import casadi as ca
 
+ROUNDING = 1e-14  # of the sum of the variances: more than a prediction and an update lose by rounding
 SHARPEST = 1e-11  # of the variances of the states measured: a smaller noise variance would drown in their rounding
 
 
 def symmetric(P: Any) -> Any:
     """The matrix that has the upper triangle of P on both sides."""
     return ca.triu2symm(ca.triu(P))
+
+
+def predicted(P: Any) -> Any:
+    """A predicted covariance, symmetric, and so far from having a negative eigenvalue that no rounding brings it there.
+
+    Once negative, an eigenvalue would grow with every update that follows.
+    """
+    return symmetric(P + ROUNDING * ca.trace(P) * ca.SX.eye(P.shape[0]))
 
 
 Row = Mapping[int, Any]  # of a measurement matrix: the coefficients of the states that are measured
@@ -33,6 +42,15 @@ def update(x: Any, P: Any, row: Row, y: Any, r: Any, accepted: Any = 1) -> tuple
     noise = ca.if_else(r > finest, r, finest)
     K = ca.if_else(accepted, PH / (variance + noise), 0)
     return x + K * (y - sum(h * x[i] for i, h in row.items())), symmetric(P - K @ PH.T)
+
+
+def update_by_state(x: Any, P: Any, i: int, h: Any, y: Any, r: Any, accepted: Any = 1) -> tuple[Any, Any]:
+    """As ``update`` by y = h x[i]: nothing cancels in row i, so r may be as small as it likes."""
+    inverse = 1 / (h**2 * P[i, i] + r)
+    K = ca.if_else(accepted, h * inverse, 0) * P[:, i]
+    after, kept = P - h * K @ P[i, :], ca.if_else(accepted, r * inverse, 1) * P[:, i]  # r inverse is 1 - K h
+    after[:, i], after[i, :] = kept, kept.T
+    return x + K * (y - h * x[i]), symmetric(after)
 
 
 def surprise(P: Any, row: Row, innovation: Any, r: Any) -> Any:

@@ -17,8 +17,8 @@ gravity in each of the last n + 1 samples:
 
 Differences from the paper: roll uses the two-argument arctangent and pitch atan2(-Z1, hypot(Z2, Z3)), which equals (4)
 where (4) can be computed. A threshold that is not met means no update at all (the limit of an infinite variance). A
-sample that is not finite is predicted over; the first usable accelerometer sample starts the filter. (12) to (29) stand
-in direction_filter.
+missing sample is predicted over; the first usable accelerometer sample starts the filter. (12) to (29) stand in
+direction_filter.
 
 [1] Lee, Park, Robinovitch, Estimation of Attitude and External Acceleration Using Inertial Sensor Measurement During
     Various Dynamic Conditions, IEEE TIM 61(8), 2012, doi:10.1109/TIM.2012.2187245

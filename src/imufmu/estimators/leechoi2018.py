@@ -24,8 +24,7 @@ The paper's Case 1 takes the process noise (14) of the same order as the integra
 
 Differences from the paper: M = sigma_A^2 I is diagonal, so the three axes of y_A correct one after the other, with the
 same numbers and without an inverse. What would overflow in a long prediction without update is bounded: the covariance
-and the length of g. A sample that is not finite is predicted over; the first usable accelerometer sample starts the
-filter.
+and the length of g. A missing sample is predicted over; the first usable accelerometer sample starts the filter.
 
 [1] Lee, Choi, Effect of Strapdown Integration Order and Sampling Rate on IMU-Based Attitude Estimation Accuracy,
     Sensors 18(9), 2018, 2775, doi:10.3390/s18092775. Equations without number are those of a Kalman filter.

@@ -28,7 +28,7 @@ Differences from the paper: (25) has the plus that the print lost; z2 is row 1 o
 with h and takes the dip from x1+(k); its infinity is no update at all. Q uses x(k-1) as in (15) and (27), unlike (8)
 and (21). x2 is normalised like x1. Arctangents have two arguments. (28) divides by cos(beta); within 0.6 deg of a
 sensor x axis that points straight up or down x2 counts as perpendicular to x1 instead, which gives the same where it
-is. A sample that is not finite is predicted over. The first usable accelerometer sample starts the tilt filter, the
+is. A missing sample is predicted over. The first usable accelerometer sample starts the tilt filter, the
 first usable magnetometer sample from there on the yaw filter; yaw is 0 at the start of the tilt filter until then.
 
 The hole in (26): a horizontal disturbance that turns the horizontal part of the field and keeps its length passes,
@@ -273,7 +273,7 @@ the tilt; lee2012 in mode 1 for the tilt alone, which is the same.""",
             shape=(3,),
         ),
         real("h", "uT", 49.2, (1e-3, v.MAG.maximum), "Norm of the local field", tunable=True),
-        real("eps_m", "uT", 0.5, (0, v.MAG.maximum), "Deviation of the norm that means disturbed", tunable=True),
+        real("eps_m", "uT", 0.5, (0, 1e6), "Deviation of the norm that means disturbed", tunable=True),
         real("eps_dip", "rad", radians(2), (0, pi), "Change of the dip that means disturbed", tunable=True),
         real("eps_yaw", "rad", pi, (0, pi), "Largest undisturbed yaw_innovation; pi any, the paper", tunable=True),
         real(

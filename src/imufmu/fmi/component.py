@@ -11,7 +11,7 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from ..blocks.block import Block, ParameterError, Variable
-from ..blocks.instance import SampledInstance, StepError, instantiate
+from ..blocks.instance import SampledInstance, StateError, StepError, instantiate
 from ..blocks.signals import Parameter
 
 
@@ -49,7 +49,7 @@ class Component:
         self._phase = INSTANTIATED
         self._failed = False
         self._stale = True  # the outputs do not yet reflect the inputs and parameters in force
-        self._missing = False  # in an episode of inputs that are not finite
+        self._missing = False  # in an episode of inputs that count as missing
 
     def failed(self) -> None:
         """Do not go on: a call was refused."""
@@ -102,12 +102,10 @@ class Component:
         return Refusal(f"{self.block.name}: {reason}")
 
     def _report_missing_inputs(self) -> None:
-        """Warn once per episode which inputs are not finite."""
-        names = []
-        if not math.isfinite(sum(self._instance.u.tolist())):  # one sum is cheaper than many questions
-            names = [v.name for v in self.block.variables[: self._inputs] if not math.isfinite(self._values[v.index])]
+        """Warn once per episode which inputs count as missing."""
+        names = self._instance.missing_inputs()
         if names and not self._missing:
-            self._warn(f"{self.block.name}: not finite, treated as missing: {', '.join(names)}")
+            self._warn(f"{self.block.name}: not finite or out of bounds, treated as missing: {', '.join(names)}")
         self._missing = bool(names)
 
     def _refresh(self) -> None:
@@ -196,7 +194,10 @@ class Component:
         """Return to a state from ``get_state``."""
         if not isinstance(state, dict) or state.get("block") != self.block.name:
             raise self._refusal("the state is that of another FMU and was not set")
-        self._instance.set_state(state["instance"])
+        try:
+            self._instance.set_state(state["instance"])
+        except StateError as error:
+            raise Refusal(str(error)) from error
         self._phase, self._stale = state["phase"], state["stale"]
         self._missing, self._start_time = state["missing"], state["setup"]
         self._failed = False

@@ -9,7 +9,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from .. import __version__
 from ..blocks.block import Block, ContinuousBlock, SampledBlock, Variable
-from ..blocks.instance import CLOCK_TOLERANCE, LONGEST_STEP
+from ..blocks.instance import CLOCK_TOLERANCE, LONGEST_STEP, TIME_ROUNDING
 from ..blocks.signals import Parameter
 from ..compiled.equations import derivatives_of, equations, functions_of, sizes
 from .model_description import guid, value_references, variable_type
@@ -33,7 +33,7 @@ def _table(block: Block, functions: dict[str, Any]) -> str:
         constants=_constants(block, functions, references),
         streams=[(references[name], width) for name, width in block.seeds],
         aliases={alias: function.name() for alias, function in functions.items()},
-        variables=[_row(variable) for _, variable in sorted(value_references(block), key=lambda listed: listed[0])],
+        variables=[_row(block, v) for _, v in sorted(value_references(block), key=lambda listed: listed[0])],
         c_string=json.dumps,  # the names and units are plain ASCII, which both languages quote alike
     )
 
@@ -50,13 +50,15 @@ def _constants(block: Block, functions: dict[str, Any], references: dict[str, in
         "PERIOD": references["sample_period" if sampled else "max_step"],
         "SAMPLE_TIME": references.get("sample_time", len(references)),  # a continuous block has none
         "CLOCK_TOLERANCE": repr(CLOCK_TOLERANCE),
+        "TIME_ROUNDING": repr(TIME_ROUNDING),
         "LONGEST_STEP": repr(float(LONGEST_STEP)),
     }
 
 
-def _row(variable: Variable) -> dict[str, str]:
-    """One line of the table; numbers read back as the same double."""
+def _row(block: Block, variable: Variable) -> dict[str, str]:
+    """One line of the table; numbers read back as the same double. An input is missing outside minimum and maximum."""
     signal = variable.signal
+    bounds = block.bounds_of(signal) if variable.group == "input" else (signal.minimum, signal.maximum)
     role = variable.group.upper()
     if isinstance(signal, Parameter):
         role = "TUNABLE" if signal.tunable else "FIXED"
@@ -66,6 +68,6 @@ def _row(variable: Variable) -> dict[str, str]:
         "type": variable_type(variable).upper(),
         "role": role,
         "start": repr(float(variable.start)),
-        "minimum": repr(float(signal.minimum)),
-        "maximum": repr(float(signal.maximum)),
+        "minimum": repr(float(bounds[0])),
+        "maximum": repr(float(bounds[1])),
     }

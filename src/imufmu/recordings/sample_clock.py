@@ -55,8 +55,23 @@ def sample_clock(time: np.ndarray) -> tuple[float, np.ndarray]:
             "rows around it crowd; give one row per sample, at a constant rate",
         )
     shortest = np.min(steps)
-    period = float(np.mean(intervals[steps == shortest]) / shortest)
-    return float(f"{period:.12g}"), index  # 0.01, not 0.010000000000000002
+    regular = steps == shortest
+    period = float(np.mean(intervals[regular]) / shortest)
+    pieces = 1 + np.count_nonzero(~regular)  # each begins and ends with a stamp, rounded by half a spacing
+    rounding = pieces * np.spacing(np.abs(time).max()) / (np.count_nonzero(regular) * shortest)
+    return _plainest(period, float(rounding)), index
+
+
+def _plainest(period: float, rounding: float) -> float:
+    """The period, or rate, of the fewest digits that the rounding of the stamps allows; of twelve at most.
+
+    0.01, not 0.010000000000000002; nor 0.0099999987 where the stamps count from 1970.
+    """
+    for digits in range(1, 12):
+        for plain in (float(f"{period:.{digits}g}"), 1 / float(f"{1 / period:.{digits}g}")):
+            if abs(plain - period) <= rounding:
+                return float(f"{plain:.12g}")
+    return float(f"{period:.12g}")
 
 
 def _instants(time: np.ndarray, period: float) -> np.ndarray:

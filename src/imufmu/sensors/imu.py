@@ -6,10 +6,11 @@ errors act in this order, each exactly off at zero:
     1  alignment, scale   (I + diag(scale_error)) M u
     2  bias               + bias + bias_instability d_k
     3  white noise        + noise_density sqrt(sample_rate / 2) n_k
-    4  range              clipped to [-range, range]; 0 is unlimited
+    4  range              clipped to [-range, range]; 0 is the bound of the reading's signal
     5  resolution         rounded to whole multiples of resolution; 0 is off
 
-A range that is a whole multiple of the resolution stays the largest reading.
+A range that is a whole multiple of the resolution stays the largest reading. Nothing leaves the bounds of the reading's
+signal, beyond which an estimator takes it for missing.
 
 Alignment. Row i of M is the direction of sensitive axis i, to first order in the angles m_ij (rad) by which it leans
 towards axis j (for cross-axis sensitivity: reading i per unit along axis j):
@@ -55,6 +56,7 @@ from ..blocks.signals import Parameter, Signal, State, real
 
 SENSORS = ((v.ANGULAR_VELOCITY, v.GYRO), (v.SPECIFIC_FORCE, v.ACCEL), (v.MAGNETIC_FIELD, v.MAG))  # ideal, reading
 AXES = 3 * len(SENSORS)
+ALL_WHOLE = 2.0**52  # a number of this size has no fraction
 
 
 def error_parameters(sensor: Signal) -> tuple[Parameter, ...]:
@@ -73,7 +75,7 @@ def error_parameters(sensor: Signal) -> tuple[Parameter, ...]:
         error("bias_instability", unit, (0, limit), "Standard deviation of the drifting bias (Gauss-Markov)"),
         error("bias_time", "s", (1e-6, 1e9), "Correlation time of the drifting bias", start=100.0),
         error("noise_density", f"{unit}/sqrt(Hz)", (0, limit), "White noise, one-sided density"),
-        error("range", unit, (0, limit), "Largest reading, either sign; 0 unlimited"),
+        error("range", unit, (0, limit), f"Largest reading, either sign; 0 is {limit:g}"),
         error("resolution", unit, (0, limit), "Step of the reading; 0 off"),
     )
 
@@ -96,14 +98,25 @@ def alignment_matrix(misalignment: Any) -> Any:
     return ca.vertcat(ca.horzcat(1, m12, m13), ca.horzcat(m21, 1, m23), ca.horzcat(m31, m32, 1))
 
 
-def reading(ideal: Any, drift: Any, n: Any, e: SimpleNamespace, period: Any) -> Any:
+def within(y: Any, limit: Any) -> Any:
+    """Every element clipped to [-limit, limit]."""
+    return ca.fmax(-limit, ca.fmin(y, limit))
+
+
+def rounded(y: Any, step: Any) -> Any:
+    """The nearest whole multiples of step; y itself where they are as dense as numbers are, and where step is 0."""
+    counts = y / ca.if_else(step > 0, step, 1)
+    coarse = ca.logic_and(step > 0, ca.fabs(counts) < ALL_WHOLE)
+    return ca.if_else(coarse, step * ca.floor(counts + 0.5), y)
+
+
+def reading(ideal: Any, drift: Any, n: Any, e: SimpleNamespace, period: Any, limit: float) -> Any:
     """Reading (3,) of one sensor with errors e; drift and n (3,) are of unit variance."""
     y = (1 + e.scale_error) * (alignment_matrix(e.misalignment) @ ideal)
     y += e.bias + e.bias_instability * drift
     y += e.noise_density / ca.sqrt(2 * period) * n
-    y = ca.if_else(e.range > 0, ca.fmax(-e.range, ca.fmin(y, e.range)), y)
-    step = ca.if_else(e.resolution > 0, e.resolution, 1)
-    return ca.if_else(e.resolution > 0, step * ca.floor(y / step + 0.5), y)
+    y = within(y, ca.if_else(e.range > 0, e.range, limit))
+    return within(rounded(y, e.resolution), limit)
 
 
 def initial(u: SimpleNamespace, p: SimpleNamespace) -> Expressions:
@@ -123,7 +136,7 @@ def output(x: SimpleNamespace, u: SimpleNamespace, p: SimpleNamespace) -> Expres
     """Readings of one sample."""
     draws = zip(SENSORS, ca.vertsplit(x.drift, 3), ca.vertsplit(u.normal[AXES:], 3), strict=True)
     return {
-        sensor.name: reading(getattr(u, ideal.name), drift, n, errors_of(sensor, p), p.sample_period)
+        sensor.name: reading(getattr(u, ideal.name), drift, n, errors_of(sensor, p), p.sample_period, sensor.maximum)
         for (ideal, sensor), drift, n in draws
     }
 
@@ -136,7 +149,7 @@ misalignment and scale error, constant and drifting bias, white noise, saturatio
 resolution. Every error is off at zero, so the block as it stands is an ideal IMU. Noise density is one-sided, as
 datasheets print it: the standard deviation of a sample is noise density times the square root of half the sample rate.
 Not modelled: bandwidth, temperature, nonlinearity, sensitivity of the gyroscope to acceleration. An input that is not
-finite is held.""",
+finite or out of its bounds is held.""",
     reference="Error model: IEEE Std 952-1997, annex C; D. Tedaldi, A. Pretto, E. Menegatti, ICRA 2014, "
     "doi:10.1109/ICRA.2014.6907297",
     inputs=v.IDEAL_IMU,

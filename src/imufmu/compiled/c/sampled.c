@@ -31,5 +31,17 @@ EXPORTED void block_rows(long long rows, double *x, const double *u, const doubl
         block_next(arguments, results, integer_work, work, 0);
         memcpy(x, next, sizeof next);
 #endif
+#if BEGINS_ANEW
+        double sound = 0.0;
+        const double *sound_arguments[N_ARGUMENTS] = {y};
+        double *sound_results[N_RESULTS] = {&sound};
+        block_sound(sound_arguments, sound_results, integer_work, work, 0);
+        if (sound == 0.0) {
+            const double *first_arguments[N_ARGUMENTS] = {u, p, w};
+            double *first_results[N_RESULTS] = {x, y};
+            block_first(first_arguments, first_results, integer_work, work, 0);
+            y[STATUS_AT] += RESTARTED;
+        }
+#endif
     }
 }

@@ -23,12 +23,12 @@ _REPEATS = 15
 
 def compiled(tried: Filter) -> Any:
     """CasADi Function of one step with the parameters of the filter as constants; what depends on no input is gone."""
-    x, u, p, w = BLOCK.next_function.sx_in()
+    x, u, p, w = BLOCK.following_function.sx_in()
     names = [v.name for v in BLOCK.variables if v.group == "parameter"]
     constants = {"normalise": 0, "gyro_index": 0, "use_initial_angles": 0, **tried.parameters}
     fixed = ca.vertcat(*(constants.get(name, p[i]) for i, name in enumerate(names)))
     return ca.Function(
-        f"order_{tried.order}_{tried.process_noise_order}", [x, u, p, w], BLOCK.next_function(x, u, fixed, w)
+        f"order_{tried.order}_{tried.process_noise_order}", [x, u, p, w], BLOCK.following_function(x, u, fixed, w)
     )
 
 
