@@ -99,3 +99,4 @@ class Status(IntFlag):
     ACCEL_REJECTED = 8  # the filter's own test took it for motion
     MAG_REJECTED = 16  # the filter's own test took it for a disturbance
     NOT_INITIALISED = 32  # no usable accelerometer sample yet: attitude is the start value
+    LOST = 64  # the filter found its attitude wrong and seeks the vertical anew
