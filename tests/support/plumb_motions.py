@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -54,3 +55,43 @@ def moving(
     waves = np.sin(2 * np.pi * frequency * t[:, None, None] + phase).sum(axis=1)
     velocity = np.minimum(since, 1)[:, None] * speed / 2 * waves
     return motions._readings(dt, mean_rates(R_NS, dt), R_NS, np.diff(velocity, axis=0, prepend=velocity[:1]) / dt)
+
+
+def smooth(t: np.ndarray, begin: float, lasts: float) -> np.ndarray:
+    """0 until ``begin``, 1 from ``lasts`` s later, without a corner between."""
+    x = np.clip((t - begin) / lasts, 0, 1)
+    return x * x * (3 - 2 * x)
+
+
+def carried(
+    t: np.ndarray,
+    *,
+    roll: np.ndarray | float = 0.0,
+    pitch: np.ndarray | float = 0.0,
+    yaw: np.ndarray | float = 0.0,
+    acceleration: tuple[np.ndarray | float, ...] = (0.0, 0.0, 0.0),
+) -> Motion:
+    """A sensor with these Euler angles (rad) and this acceleration in N (m/s2), each over time or constant."""
+    angles = np.column_stack([np.broadcast_to(a, len(t)) for a in (yaw, pitch, roll)])
+    a_N = np.column_stack([np.broadcast_to(a, len(t)) for a in acceleration])
+    R_NS, dt = Rotation.from_euler("ZYX", angles), t[1] - t[0]
+    return motions._readings(dt, mean_rates(R_NS, dt), R_NS, a_N)
+
+
+def part_of(motion: Motion, rows: Any) -> Motion:
+    """The rows of a motion that an index picks, as if nothing were missing between."""
+    names = ("gyro", "accel", "mag", "vertical", "acceleration", "R_NS")
+    return Motion(motion.dt, *(getattr(motion, name)[rows] for name in names))
+
+
+def consumer(motion: Motion, seed: int = 30) -> dict[str, np.ndarray]:
+    """The readings of a motion with the noise of a consumer device and its bias of 0.4 deg/s."""
+    rng, n, wide = np.random.default_rng(seed), len(motion.gyro), math.sqrt(0.02 / motion.dt)
+    gyro = motion.gyro + np.array([0.005, -0.003, 0.004]) + rng.normal(0, 0.001 * wide, (n, 3))
+    return {"gyro": gyro, "accel": motion.accel + rng.normal(0, 0.005 * wide, (n, 3))}
+
+
+def tilt_of(motion: Motion, readings: dict[str, np.ndarray], **parameters: Any) -> tuple[np.ndarray, Trajectory]:
+    """Tilt error (deg) over time, and all results."""
+    result = run(BLOCK, readings, {"sample_period": motion.dt, "g": G, "gyro_index": 1} | parameters)
+    return tilt_deg(motion, result), result

@@ -117,3 +117,4 @@ class Status(IntFlag):
     MAG_REJECTED = 16  # the filter's own test took it for a disturbance
     NOT_INITIALISED = 32  # no usable accelerometer sample yet: attitude is the start value
     RESTARTED = 64  # its numbers were not finite any more: it began anew with this sample
+    LOST = 128  # the filter found its attitude wrong and seeks the vertical anew

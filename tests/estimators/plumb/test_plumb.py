@@ -10,10 +10,11 @@ import pytest
 
 from imufmu.blocks.instance import SampledInstance
 from imufmu.blocks.signals import total_size
+from imufmu.blocks.vocabulary import Status
 from imufmu.compiled.running import run
 from imufmu.recordings.reading import read
 from imufmu.scoring.metrics import inclination_error
-from support.plumb_motions import BLOCK, DEFAULTS, G, moving, rms
+from support.plumb_motions import BLOCK, DEFAULTS, G, carried, consumer, moving, rms, smooth
 from support.plumb_reference import reference_run
 from support.toys import eager
 
@@ -39,6 +40,31 @@ def test_it_is_the_filter_of_its_docstring(dt: float, parameters: dict[str, floa
     for name, values in expected.items():
         # Rounding differs, and the filter is linear but for its small corrections: it does not grow.
         assert np.allclose(actual[name].reshape(values.shape), values, rtol=1e-9, atol=1e-9), name
+
+
+def test_it_is_that_filter_where_it_goes_wrong() -> None:
+    """A flick that clips, samples lost in a turn, a hit, nonsense, a train: what rest and motion leave out."""
+    t = np.arange(0, 70, 0.01)
+    turns = np.pi * smooth(t, 10, 0.4) + np.radians(90) * smooth(t, 20, 1.2)
+    swings = smooth(t, 30, 1) - smooth(t, 50, 1)
+    pushes = smooth(t, 60, 1) - smooth(t, 66, 1)
+    motion = carried(
+        t, roll=turns + 0.3 * swings * np.sin(t), pitch=0.2 * swings * np.sin(2 * t), acceleration=(pushes, 0, 0)
+    )
+    readings = consumer(motion)
+    readings["gyro"] = np.clip(readings["gyro"], -np.radians(500), np.radians(500))
+    readings["accel"][4000:4002] += [150, -90, 60]
+    readings["gyro"][4000:4002] += [3, -6, 2]
+    readings["accel"][4200], readings["gyro"][4300] = 1e8, -1e8
+    kept = np.delete(np.arange(len(t)), slice(2055, 2065))
+    gyro, accel = readings["gyro"][kept], readings["accel"][kept]
+    settings = {"sample_period": 0.01, "gyro_index": 2}
+    actual = run(BLOCK, {"gyro": gyro, "accel": accel}, settings)
+    assert {0, Status.GYRO_MISSING, Status.ACCEL_MISSING, Status.LOST} == set(actual["status"].astype(int))
+    for name, values in reference_run(gyro.copy(), accel.copy(), DEFAULTS | settings).items():
+        assert np.allclose(actual[name].reshape(values.shape), values, rtol=1e-8, atol=1e-8), (
+            name
+        )  # as above, more turns
 
 
 def test_skipping_the_slow_step_changes_nothing() -> None:
@@ -71,10 +97,11 @@ def test_the_covariance_stays_positive_and_bounded_over_hours() -> None:
             deviation = np.sqrt(np.diag(P))
             assert np.linalg.eigvalsh((P + np.triu(P, 1).T) / np.outer(deviation, deviation)).min() > 0
             largest = np.maximum(largest, deviation)
-    # Yaw, and the bias about the vertical while it spins, are observed by nothing: they stop at 1 rad and 1 rad/s.
+    # Yaw, and the bias about the vertical while it spins, are observed by nothing: they stop at 1 rad and 1 rad/s. The
+    # velocity of so wild a motion is known to a few m/s.
     assert largest[2] == pytest.approx(1, abs=1e-6)
     assert largest[8] == pytest.approx(1, abs=1e-6)
-    assert np.all(largest < 2)
+    assert np.all(largest < 5)
 
 
 @pytest.mark.parametrize(
@@ -83,6 +110,7 @@ def test_the_covariance_stays_positive_and_bounded_over_hours() -> None:
 def test_real_motion_is_followed_within_half_a_degree(trial: str, limit_deg: float, broad: Path) -> None:
     """Against the truth as recorded; VQF has 0.60 and 0.47 deg."""
     recording = read(broad / f"{trial}.mat")
-    result = run(BLOCK, {"gyro": recording.gyro, "accel": recording.accel}, {"sample_period": recording.sample_period})
+    settings = {"sample_period": recording.sample_period, "gyro_index": 1}  # the device integrates
+    result = run(BLOCK, {"gyro": recording.gyro, "accel": recording.accel}, settings)
     error = inclination_error(result["vertical"], recording.truth["vertical"])[recording.scored]
     assert np.rad2deg(rms(error)) < limit_deg

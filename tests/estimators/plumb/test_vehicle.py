@@ -115,9 +115,9 @@ def test_a_speed_that_keeps_disagreeing_is_believed_in_the_end(drives: dict[str,
 
 
 def test_steady_travel_is_no_rest_of_a_vehicle(drives: dict[str, Drive]) -> None:
-    """At a constant 20 m/s nothing but the wheels tells that it moves."""
+    """At a constant 20 m/s nothing but the wheels and a slow drift of the readings tells that it moves."""
     drive = drives["lane_changes"]
     t = np.arange(len(drive.gyro)) * DT
     cruises = (t > 10.2) & (t < 10.9)
     assert not with_speed(drive)["stationary"][cruises].any()
-    assert run(BLOCK, readings(drive), {"sample_period": DT, "g": G})["stationary"][cruises][-1]
+    assert run(BLOCK, readings(drive), {"sample_period": DT, "g": G})["stationary"][cruises].mean() < 0.1

@@ -33,8 +33,8 @@ def predicted(P: Any, S: Any, x: SimpleNamespace, H: Any, p: SimpleNamespace) ->
     P[PSI, PSI] = psi[:, PSI] + of_rate(psi.T, theta).T @ S.T
     P[PSI, 6:], P[V, 6:] = psi[:, 6:], dv[:, 6:]
     W = H * p.k_g**2 * theta @ theta.T + p.s_s**2 * ca.diag(x.blind)  # (6)
-    P[PSI, PSI] += p.s_g**2 * H * I3 + R @ W @ R.T  # (6)
-    P[V, V] += (p.s_a**2 * H + p.s_m**2 * (H - x.T)) * I3  # (6)
+    P[PSI, PSI] += (p.s_g**2 * H + p.k_j**2 * x.jerk) * I3 + R @ W @ R.T  # (6)
+    P[V, V] += (p.s_a**2 * H + p.s_m**2 * (H - x.T) + p.k_a**2 * x.jolt) * I3  # (6)
     P[B, B] += p.s_b**2 * H * I3  # (6)
     return bounded(ca.triu2symm(ca.triu(P)))
 
@@ -52,11 +52,22 @@ def bounded(P: Any) -> Any:
     return P * (scale @ scale.T)
 
 
-def measure(error: Any, P: Any, part: slice, values: Sequence[Any], variance: Any) -> tuple[Any, Any]:
-    """Errors and covariance after measurements of the three errors ``part``, one after the other."""
-    for i, value in zip(range(N_ERRORS)[part], values, strict=True):
-        error, P = update(error, P, {i: 1}, value, variance)
+def measure(error: Any, P: Any, part: slice, values: Sequence[Any], variance: Any, learns: Any = 1) -> tuple[Any, Any]:
+    """Errors and covariance after measurements of the three errors ``part``, one after the other.
+
+    variance: one for all, or (3,). learns: 0 leaves the errors of the gyroscope and their covariance as they are.
+    """
+    accepted = ca.SX.ones(N_ERRORS)
+    accepted[B], accepted[D] = learns, learns
+    variances = ca.vertsplit(variance * ca.SX.ones(3))
+    for i, value, r in zip(range(N_ERRORS)[part], values, variances, strict=True):
+        error, P = update(error, P, {i: 1}, value, r, accepted)
     return error, P
+
+
+def tilt_variance(P: Any) -> Any:
+    """Variance of the tilt (rad2)."""
+    return P[0, 0] + P[1, 1]
 
 
 def forgotten(P: Any, condition: Any, variance: Any = 0) -> Any:
