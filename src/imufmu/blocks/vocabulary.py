@@ -79,7 +79,7 @@ STATUS = Signal(
     "status",
     "1",
     "0 ok, else the sum of: 1 gyroscope, 2 accelerometer, 4 magnetometer missing; 8 accelerometer, 16 magnetometer "
-    "rejected; 32 not initialised; 64 begun anew",
+    "rejected; 32 not initialised; 64 begun anew; 128 found wrong, sought anew",
     0.0,
     1023.0,
 )

@@ -149,7 +149,7 @@ errors. One set of parameters serves hand-held, body-worn and tool-mounted senso
 motion, with or without rest, started anywhere. Only gyro_index, the ranges and g follow the sensor and the place.
 gyro_index: 1 for a device that integrates its rates between samples, 2 where they are the values of instants; 3, the
 default, where that is unknown. The wrong one of 1 and 2 costs most at low sample rates.
-tilt_std follows the motion and grows where physics gives no answer. status 64 says that the filter found its attitude
+tilt_std follows the motion and grows where physics gives no answer. status 128 says that the filter found its attitude
 wrong - samples were lost, a gyroscope clipped, a hit - and looks for the vertical anew. Clipping is noticed from the
 readings; a gyro_range that is known is better.
 Start it at rest if you can: it then knows the attitude in a third of a second and the bias within seconds. In the
