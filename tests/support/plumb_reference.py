@@ -361,7 +361,7 @@ def reference_run(gyro: np.ndarray, accel: np.ndarray, p: Mapping[str, Any]) -> 
             filter_.sample(gyro[k], accel[k], *missing)
         f = filter_
         a_S = np.zeros(3) if f.missing[1] else f.accel - p["g"] * f.R[2]
-        status = [1, 2] @ np.array(f.missing) + 64 * (f.lost > 0)
+        status = [1, 2] @ np.array(f.missing) + 128 * (f.lost > 0)
         row = [f.R[2], f.b, f.v, f.D.ravel(), [f.tilt_std(), math.sqrt(f.V), f.at_rest(), status], a_S]
         rows.append(np.concatenate(row))
     names = ["vertical", "gyro_bias", "velocity", "gyro_error"]
