@@ -6,7 +6,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from fmpy.fmi1 import FMICallException
 
 from imufmu.compiled.running import run
 from imufmu.cosim.replay import estimator_fmu, replay
@@ -14,6 +13,7 @@ from imufmu.files.csv_table import write_csv
 from imufmu.recordings.reading import read
 from imufmu.registry import BLOCKS
 from support import fmu
+from support.fmu import refusal
 
 EPOCH = 1.7e9
 ROWS = 400
@@ -114,9 +114,8 @@ def test_a_step_of_more_than_a_million_internal_steps_is_refused(kind: str, name
     instance = fmu.Fmu(name, kind=kind).initialise()
     internal = 0.01 if name == "lee2012" else BLOCKS[name].longest_step
     before = instance.reals()
-    with pytest.raises(FMICallException):
-        instance.step(0.0, 1.001e6 * internal)
-    assert "is more than 1" in instance.log[-1][1] and "internal steps" in instance.log[-1][1]
+    message = refusal(instance, lambda: instance.step(0.0, 1.001e6 * internal))
+    assert "is more than 1" in message and "internal steps" in message
     assert instance.reals() == before
     instance.step(0.0, 10 * internal)
     instance.close()
