@@ -202,14 +202,22 @@ def _apart(text: str) -> list[str]:
 
 
 def _matrix(lines: list[str]) -> str:
-    """A matrix drawn with bars, one line per row, with what stands before and behind it on one of the lines."""
+    """A matrix drawn with bars, one line per row, with what stands before and behind it on one of the lines; else empty."""
     found = [re.fullmatch(r"([^|]*)\|([^|]*)\|([^|]*)", line) for line in lines]
     if len(lines) < 2 or not all(found):
         return ""
-    rows = [[f"<mtd>{formula(cell)}</mtd>" for cell in match[2].split()] for match in found if match]
     before, behind = ("".join(match[group].strip() for match in found if match) for group in (1, 3))
+    try:
+        rows = [[f"<mtd>{formula(cell)}</mtd>" for cell in match[2].split()] for match in found if match]
+        around = [_inner(part) for part in (before, behind)]
+    except FormulaError:
+        return ""
     table = "".join(f"<mtr>{''.join(row)}</mtr>" for row in rows)
     inside = f'<mrow><mo fence="true">(</mo><mtable>{table}</mtable><mo fence="true">)</mo></mrow>'
-    around = [formula(part).removeprefix("<math>").removesuffix("</math>") if part else "" for part in (before, behind)]
     whole = f'<math displaystyle="true">{around[0]}{inside}<mspace width="2em"/>{around[1]}</math>'
     return f'<div class="formulas"><div><span>{whole}</span></div></div>'
+
+
+def _inner(text: str) -> str:
+    """A formula without the element around it; empty for none."""
+    return formula(text).removeprefix("<math>").removesuffix("</math>") if text else ""
