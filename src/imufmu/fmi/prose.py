@@ -20,7 +20,7 @@ _COLUMN_GAP = re.compile(r"\s{2,}")
 _NUMBER = re.compile(r"\s{2,}(\(\d+\w?\)(?:, \(\d+\w?\))*|\[\d+, \(\d+\)\])$")
 _HEADER_WORDS = {"here", "symbol", "paper", "unit", "meaning", "section"}
 _REFERENCE = re.compile(r"\[(\d+)\] ")
-_DOI = re.compile(r"\bdoi:(10\.\S*[^\s.,;:)])")
+_DOI = re.compile(r"\bdoi:(10\.[^\s<>]*[^\s<>.,;:)])")
 _VARIABLE = re.compile(r"(?<![\w.])([xup]\.)?\b([A-Za-z]\w*(?(1)|_\w+))\b")  # x.P, u.gyro, or with an underscore
 _SYMBOL = re.compile(
     rf"(?<![\w./&;-])(?:{'|'.join(sorted(GREEK))}|[A-Za-z](?=_|\^\d))(?:_[A-Za-z0-9]+(?:-\d)?)*'*(?:\^(\d))?(?![\w(]|\.\w)"
@@ -202,7 +202,7 @@ def _apart(text: str) -> list[str]:
 
 
 def _matrix(lines: list[str]) -> str:
-    """A matrix drawn with bars, one line per row, with what stands before and behind it on one of the lines; else empty."""
+    """A matrix drawn with bars, a line per row, with what stands before and behind it on one line; empty for none."""
     found = [re.fullmatch(r"([^|]*)\|([^|]*)\|([^|]*)", line) for line in lines]
     if len(lines) < 2 or not all(found):
         return ""
