@@ -15,6 +15,7 @@ import signal
 import struct
 import subprocess
 import sys
+import threading
 from collections.abc import Iterator, Sequence
 from concurrent.futures import Executor
 from contextlib import contextmanager, suppress
@@ -72,6 +73,7 @@ _ARITHMETIC = ("-fno-fast-math", "-ffp-contract=off", "-fno-math-errno", "-fno-t
 _FLAGS = ("-std=c99", "-O2", *_ARITHMETIC, "-fvisibility=hidden", "-shared", "-s")
 
 _running: set[subprocess.Popen[bytes]] = set()  # compilers, in any thread
+_starting = threading.Lock()  # held while a compiler is started, or all are ended
 _SECONDS = 600.0  # of one call; the first one for Windows takes 75 s on a slow machine
 
 # Named behind the source, or the linker leaves it out.
@@ -184,14 +186,15 @@ def _said(command: Sequence[str]) -> tuple[int, str]:
 
 
 def _started(command: Sequence[str], words: IO[bytes]) -> subprocess.Popen[bytes]:
-    try:
-        process = subprocess.Popen(
-            command, stdin=subprocess.DEVNULL, stdout=words, stderr=subprocess.STDOUT, start_new_session=True
-        )
-    except OSError as error:
-        raise BuildError(f"{_named(command)} cannot be started: {error.strerror or error}") from error
-    _running.add(process)
-    return process
+    with _starting:  # one that runs already is in the set when another thread ends them all
+        try:
+            process = subprocess.Popen(
+                command, stdin=subprocess.DEVNULL, stdout=words, stderr=subprocess.STDOUT, start_new_session=True
+            )
+        except OSError as error:
+            raise BuildError(f"{_named(command)} cannot be started: {error.strerror or error}") from error
+        _running.add(process)
+        return process
 
 
 def _end(process: subprocess.Popen[bytes]) -> None:
@@ -209,8 +212,9 @@ def compilers_end_with_us(pool: Executor) -> Iterator[None]:
         yield
     except BaseException:
         pool.shutdown(wait=False, cancel_futures=True)
-        for process in set(_running):
-            _end(process)
+        with _starting:
+            for process in set(_running):
+                _end(process)
         raise
 
 
