@@ -76,6 +76,7 @@ def initial(u: SimpleNamespace, p: SimpleNamespace) -> Expressions:
         P=upper_triangle(ca.diag(std**2)),
         **block.first_attitude(x, u, p),
         **rest.first(x.gyro_used, x.accel_used, p),
+        mag_age=0,
         **block.EMPTY,
         **block.UNKNOWN,
         **vehicle.NO_SPEED,
@@ -96,6 +97,7 @@ def step(x: SimpleNamespace, u: SimpleNamespace, p: SimpleNamespace) -> Expressi
         **read,
         **clipping,
         **rest.sample(x, now, u, p),
+        **heading.age(x, u),
         q=q,
         started=x.started,
         samples=x.samples + x.started,
@@ -235,6 +237,7 @@ references, or where the step must be as small as can be; bennett2014 for two li
     state=(
         *readings.STATES,
         *rest.FAST_STATES,
+        *heading.FAST_STATES,
         State("q", (4,)),
         State("started"),
         State("samples"),
