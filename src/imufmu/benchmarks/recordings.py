@@ -34,6 +34,7 @@ from ..scoring.table import Table
 from .contenders import Contender, Readings, with_magnetometer, with_papers_parameters, with_real_parameters
 from .heading import HeadingScore, heading_scores, heading_tables
 from .peers import heading_peers, peers
+from .starts import StartScore, start_scores, start_tables
 
 DELAY = 0.0023  # s, of the readings of BROAD against its truth
 REST = 3.0  # s
@@ -69,6 +70,7 @@ class Benchmark:
     groups: Sequence[str]
     notes: Sequence[str]
     headings: Sequence[HeadingScore] = ()
+    starts: Sequence[StartScore] = ()
     files: Sequence[Path] = ()
 
 
@@ -85,13 +87,15 @@ def benchmark(
     *,
     delay: float | None = None,
     rest: float = REST,
+    starts: int = 0,
     progress: Progress | None = None,
 ) -> Benchmark:
     """Run the estimators of these names, or all, and the installed peers over every recording with truth in a folder.
 
     delay: of the truth, s, beside no delay; None: DELAY for trials of BROAD, and none for other recordings, of whose
-    clocks nothing is known. rest: how much of a recording's start is rest, s; 0 leaves the gyro as it
-    is. Raises ValueError for an unknown estimator or a folder with nothing to score.
+    clocks nothing is known. rest: how much of a recording's start is rest, s; 0 leaves the gyro as it is. starts: how
+    often to begin anew inside the motion of each recording. Raises ValueError for an unknown estimator or a folder with
+    nothing to score.
     """
     calibrated = f", gyro bias of the first {rest:g} s removed" if rest else ""
     contests = [
@@ -104,6 +108,7 @@ def benchmark(
     order, groups_of = _broad_groups(folder / GROUPS_FILE)
     scores: list[Score] = []
     headings: list[HeadingScore] = []
+    begun: list[StartScore] = []
     notes: list[str] = []
     for done, path in enumerate(paths):
         try:
@@ -111,6 +116,7 @@ def benchmark(
             own = (DELAY if recording.is_broad else 0.0) if delay is None else delay
             truths = {d: _delayed(recording, d) for d in dict.fromkeys((0.0, own))}
             scores += _scores(recording, truths, contests, groups_of.get(recording.name, ()), notes)
+            begun += start_scores(recording, truths[own], starts, contests[1].contenders)
             headings += heading_scores(recording, groups_of.get(recording.name, ()), with_heading)
         except (RecordingError, _NothingToScore) as fault:
             notes.append(f"left out: {fault}")
@@ -120,7 +126,7 @@ def benchmark(
         found = f"; {notes[0]}" if notes else ", or .mat files of BROAD"
         raise ValueError(f"{folder}: no recording to score: put .csv files with a truth there{found}")
     groups = [name for name in order if any(name in s.groups for s in scores)]
-    return Benchmark(scores, groups, notes, headings, tuple(paths))
+    return Benchmark(scores, groups, notes, headings, begun, tuple(paths))
 
 
 class _NothingToScore(ValueError):
@@ -214,7 +220,7 @@ def tables(result: Benchmark) -> list[Section]:
     """One table per contest and delay: a row per group, or per recording without groups; a column per filter."""
     contests = dict.fromkeys((s.contest, s.delay) for s in result.scores)
     found = [_table(result, contest, delay) for contest, delay in contests]
-    return [*found, *_honesty(result), *heading_tables(result.headings, result.groups)]
+    return [*found, *_honesty(result), *start_tables(result.starts), *heading_tables(result.headings, result.groups)]
 
 
 def _table(result: Benchmark, contest: str, delay: float) -> Section:

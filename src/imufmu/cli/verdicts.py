@@ -86,6 +86,9 @@ def benchmark(
     rest_bias: Annotated[
         float, typer.Option(min=0.0, help="Rest at the start (s) whose mean gyro the second contest removes; 0: none.")
     ] = 3.0,
+    starts: Annotated[
+        int, typer.Option(min=0, max=1000, help="Begin so often inside the motion of each recording, too.")
+    ] = 0,
     csv: Annotated[Path | None, typer.Option("--csv", help="Write every score to this .csv file.")] = None,
 ) -> None:
     """Score every estimator of tilt on real recordings, beside VQF and imufusion where those are installed.
@@ -93,6 +96,7 @@ def benchmark(
     \b
       imufmu benchmark broad
       imufmu benchmark broad --estimator rizun2008 --delay 0 --csv scores.csv
+      imufmu benchmark broad --starts 6
 
     Twice: with the parameters of the papers, then with parameters for real recordings. For the columns of a .csv file
     see imufmu replay --help.
@@ -102,7 +106,7 @@ def benchmark(
 
     check_target(csv, ".csv", inputs=recordings_in(folder))
     with progress_bar(f"scoring {folder}") as progress:
-        result = score(folder, estimators or (), delay=delay, rest=rest_bias, progress=progress)
+        result = score(folder, estimators or (), delay=delay, rest=rest_bias, starts=starts, progress=progress)
     if csv:
         write_scores(csv, result)
     notes(result.notes)

@@ -118,3 +118,20 @@ def test_a_missing_sample_counts_for_nothing(hand: Motion) -> None:
     result = with_mag(hand, mag)
     assert np.array_equal((result["status"].astype(int) & Status.MAG_MISSING) > 0, np.isnan(mag[:, 1]))
     assert rms(yaw_error_deg(hand, result)[1000:]) < 1
+
+
+@pytest.mark.parametrize("every", [7, 10])
+def test_a_magnetometer_may_read_less_often(every: int, hand: Motion) -> None:
+    """Rows without a reading between, whether blocks end with one or not: as good as with all of them."""
+    mag, rare = field(hand), np.full_like(hand.mag, math.nan)
+    rare[3::every] = mag[3::every]
+    often, seldom = with_mag(hand, mag), with_mag(hand, rare)
+    assert rms(yaw_error_deg(hand, seldom)[1000:]) < 1.3 * rms(yaw_error_deg(hand, often)[1000:]) + 0.1
+
+
+def test_zeros_in_between_count_for_nothing(hand: Motion) -> None:
+    mag = field(hand)
+    mag[4000:6000] = 0
+    result = with_mag(hand, mag)
+    assert np.abs(yaw_error_deg(hand, result)[4000:6500]).max() < 3
+    assert not (result["status"].astype(int) & Status.MAG_REJECTED).any()

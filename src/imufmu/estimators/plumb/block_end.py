@@ -39,6 +39,7 @@ Variances of psi and b stop at 1 (rad, rad/s): yaw is never observed.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from types import SimpleNamespace
 from typing import Any
 
@@ -51,6 +52,7 @@ from ...blocks.rotations import (
     quaternion_from_euler,
     quaternion_from_rotation_vector,
     roll_pitch,
+    root,
     rotate,
     rotate_back,
     unit,
@@ -69,7 +71,15 @@ SCALE = 0.04  # of g; what an accelerometer may be off by and still be good
 
 UP = ca.DM([0, 0, 1])
 
-STATES = (*travel.STATES, State("resting"), State("rested"), State("lost"), State("leaned", (2,)))
+STATES = (
+    *travel.STATES,
+    State("resting"),
+    State("rested"),
+    State("lost"),
+    State("leaned", (2,)),
+    State("tilt_std"),
+    State("intensity"),
+)
 
 UNKNOWN: Expressions = dict(**travel.UNKNOWN, resting=0, rested=0, lost=0, leaned=ca.SX.zeros(2))
 
@@ -83,14 +93,14 @@ EMPTY: Expressions = dict(
     jerk=0,
     jolt=0,
 )
-MOVING, ROLLING, RESTING, OVERRULING, BEGINNING, STARTING = 1, 2, 3, 4, 5, 6
+RESTING, OVERRULING, MOVING, ROLLING, BEGINNING, STARTING = rest.REST, rest.OVERRULED, 3, 4, 5, 6
 
 
 def slow_due(x: SimpleNamespace, u: SimpleNamespace, p: SimpleNamespace) -> Any:
     """Which of SLOW_STEPS is due: at the end of a block of m samples, and at the first usable sample."""
     full_block, wheels = (x.samples + 0.5) * p.sample_period > p.h, vehicle.is_valid(u)
-    at_end = ca.if_else(rest.overruled(x, p), OVERRULING, ca.if_else(wheels, ROLLING, MOVING))
-    at_end = ca.if_else(rest.at_rest(x, p), RESTING, at_end)
+    stands = ca.logic_and(rest.is_calm(x), x.verdict > 0)
+    at_end = ca.if_else(stands, x.verdict, ca.if_else(wheels, ROLLING, MOVING))
     at_end = ca.if_else(ca.logic_and(x.coarse, ca.logic_not(wheels)), STARTING, at_end)
     return ca.if_else(
         x.started, ca.if_else(full_block, at_end, 0), ca.if_else(readings.has_vertical(x, p), BEGINNING, 0)
@@ -115,8 +125,8 @@ def end_at_start(x: SimpleNamespace, u: SimpleNamespace, p: SimpleNamespace) -> 
     """The end of a block while the vertical is hardly known."""
     H = block_length(x, p)
     after = start.end_of_block(x, H, p)
-    rests = ca.logic_not(after["coarse"]) * rest.at_rest(x, p) * (x.still_time >= p.rr_s)
-    field, present = heading.first_heading(after["q"], 1, u, p), heading.is_there(u)
+    rests = ca.logic_not(after["coarse"]) * rest.at_rest(x) * (x.still_time >= p.rr_s)
+    field, present = heading.first_heading(after["q"], 1, u, p), heading.is_there(u, ca.logic_not(u.mag_missing))
     # A turn as large as those at the start would make nonsense of what was learnt about the heading.
     anew = {name: ca.if_else(present, value, getattr(x, name)) for name, value in field.items()}
     lost = ca.if_else(ca.logic_and(after["coarse"], x.lost > 0), x.lost, ca.fmax(x.lost - H, 0))
@@ -251,7 +261,7 @@ def corrected(
         **readings.range_seen(x),
         **rest.block(x, H, p),
         **rest.levels(x, rotate_back(q, UP), tilt_variance(P), resting, H, p),
-        **heading.end_block(x, u, H, p),
+        **heading.end_block(x, u, rate(x, x.gyro_used), H, p),
     )
 
 
@@ -267,5 +277,23 @@ def within(values: Any, largest: float) -> Any:
     return ca.if_else(values > largest, largest, ca.if_else(values < -largest, -largest, values))
 
 
-# Numbers MOVING to STARTING.
-SLOW_STEPS = (end_in_motion, end_in_vehicle, end_at_rest, end_overruled, begin, end_at_start)
+def told(x: SimpleNamespace, p: SimpleNamespace) -> dict[str, Any]:
+    """What is told for every sample, but changes with a block only."""
+    tilt_std = root(tilt_variance(full(x.P)) + untold(x, p))
+    return dict(verdict=rest.verdict(x, p), tilt_std=tilt_std, intensity=root(x.speed2))
+
+
+def and_told(
+    slow_step: Callable[[SimpleNamespace, SimpleNamespace, SimpleNamespace], Expressions],
+) -> Callable[[SimpleNamespace, SimpleNamespace, SimpleNamespace], Expressions]:
+    """A slow step, and what follows from the state after it."""
+
+    def step(x: SimpleNamespace, u: SimpleNamespace, p: SimpleNamespace) -> Expressions:
+        after = dict(slow_step(x, u, p))
+        return after | told(SimpleNamespace(**vars(x) | after), p)
+
+    return step
+
+
+# Numbers RESTING to STARTING.
+SLOW_STEPS = tuple(map(and_told, (end_at_rest, end_overruled, end_in_motion, end_in_vehicle, begin, end_at_start)))

@@ -53,7 +53,6 @@ from ...blocks.rotations import (
     matrix_from_quaternion,
     multiply,
     quaternion_from_rotation_vector,
-    root,
     rotate_back,
     unit,
 )
@@ -68,7 +67,7 @@ def initial(u: SimpleNamespace, p: SimpleNamespace) -> Expressions:
     std = ca.vertcat(*[p.P0_psi] * 3, *[p.P0_v] * 3, *[p.P0_b] * 3, *[p.P0_D] * 9)
     read = readings.first(u, p)
     x = SimpleNamespace(**read)
-    return dict(
+    state = dict(
         **read,
         started=readings.has_vertical(x, p),
         v=ca.SX.zeros(3),
@@ -77,10 +76,12 @@ def initial(u: SimpleNamespace, p: SimpleNamespace) -> Expressions:
         P=upper_triangle(ca.diag(std**2)),
         **block.first_attitude(x, u, p),
         **rest.first(x.gyro_used, x.accel_used, p),
+        mag_age=0,
         **block.EMPTY,
         **block.UNKNOWN,
         **vehicle.NO_SPEED,
     )
+    return state | block.told(SimpleNamespace(**state), p)
 
 
 def step(x: SimpleNamespace, u: SimpleNamespace, p: SimpleNamespace) -> Expressions:
@@ -92,11 +93,11 @@ def step(x: SimpleNamespace, u: SimpleNamespace, p: SimpleNamespace) -> Expressi
     q = multiply(x.q, quaternion_from_rotation_vector(w * dt))  # (1)
     R = matrix_from_quaternion(q)
     T = ca.if_else(no_accel, 0, dt)
-    change = ca.sumsqr(now.gyro_used - x.gyro_used) * ca.if_else(readings.is_hit(x, now), readings.W_HIT, 1)
     return dict(
         **read,
         **clipping,
         **rest.sample(x, now, u, p),
+        **heading.age(x, u),
         q=q,
         started=x.started,
         samples=x.samples + x.started,
@@ -105,7 +106,7 @@ def step(x: SimpleNamespace, u: SimpleNamespace, p: SimpleNamespace) -> Expressi
         theta=x.theta + w * dt,  # (2)
         T=x.T + T,  # (2)
         blind=x.blind + ca.logic_or(saturated, no_gyro) * dt,  # (3)
-        jerk=x.jerk + change * dt**2,  # (3)
+        jerk=x.jerk + readings.change_of_rate(x, now) * dt**2,  # (3)
         jolt=x.jolt + ca.sumsqr(now.accel_used - x.accel_used) * dt**2,  # (3)
     )
 
@@ -125,10 +126,10 @@ def output(x: SimpleNamespace, u: SimpleNamespace, p: SimpleNamespace) -> Expres
         q_NS=heading.turned(x, q),
         vertical=matrix_from_quaternion(q)[2, :].T,
         external_acceleration=ca.if_else(x.missing < v.Status.ACCEL_MISSING, without_gravity, 0),
-        tilt_std=root(ca.trace(tilt_covariance) + block.untold(x, p)),
+        tilt_std=x.tilt_std,
         gyro_bias=x.b,
-        stationary=rest.at_rest(x, p),
-        velocity_intensity=root(x.speed2),
+        stationary=rest.at_rest(x),
+        velocity_intensity=x.intensity,
         status=x.missing
         + v.Status.NOT_INITIALISED * (1 - x.started)
         + v.Status.LOST * (x.lost > 0)
@@ -236,6 +237,7 @@ references, or where the step must be as small as can be; bennett2014 for two li
     state=(
         *readings.STATES,
         *rest.FAST_STATES,
+        *heading.FAST_STATES,
         State("q", (4,)),
         State("started"),
         State("samples"),

@@ -8,7 +8,7 @@
     f_ref    x.field_ref, x.ref_time  any, s      the undisturbed field, and how long it has been learnt
     f_new    x.field_new, x.new_time  any, s      a field that may succeed it, and how long it has lasted
 
-At the end of a block of H seconds, with the field R y_m of its last sample:
+At the end of a block of H seconds, with the field R y_m of the last sample that has one:
 
     delta += r H,   P_d <- F P_d F' + diag(s_d^2, s_r^2) H,   F = [1 H; 0 1]                   (15)
     undisturbed while |f - f_ref| < eps_m |f_ref|                                             (16)
@@ -34,7 +34,7 @@ import casadi as ca
 
 from ...blocks import vocabulary as v
 from ...blocks.block import Expressions
-from ...blocks.rotations import angle_of, multiply, norm, root, rotate
+from ...blocks.rotations import angle_of, multiply, norm, quaternion_from_rotation_vector, root, rotate
 from ...blocks.signals import Signal, State, real
 
 NEW_PLACE = 0.5  # rad; what delta may be off by where another field is taken for undisturbed
@@ -43,14 +43,16 @@ NO_FIELD = 1e-9  # in the unit of mag; a field smaller than this is none
 PARAMETERS = (
     real("declination", "rad", 0.0, (-pi, pi), "Magnetic North seen from true North, towards East"),
     real("s_h", "rad/sqrt(Hz)", 0.2, (1e-6, 1e3), "Density of the error of a heading by the magnetometer"),
-    real("k_h", "1/sqrt(Hz)", 5.0, (0, 1e3), "Growth of that density with the deviation of the field"),
-    real("eps_m", "1", 0.1, (0, 10), "Deviation of the field, of its norm, that means disturbed"),
+    real("k_h", "1/sqrt(Hz)", 10.0, (0, 1e3), "Growth of that density with the deviation of the field"),
+    real("eps_m", "1", 0.07, (0, 10), "Deviation of the field, of its norm, that means disturbed"),
     real("t_m", "s", 20.0, (0, 1e4), "How much of the undisturbed field its mean covers"),
     real("t_new", "s", 20.0, (0, 1e6), "How long another field must last to be taken for undisturbed"),
-    real("s_d", "rad/sqrt(s)", 0.016, (0, 10), "Random walk of the yaw by the gyroscope"),
-    real("s_r", "rad/s2/sqrt(Hz)", 1e-4, (0, 1), "Random walk of the drift of that yaw"),
+    real("s_d", "rad/sqrt(s)", 0.03, (0, 10), "Random walk of the yaw by the gyroscope"),
+    real("s_r", "rad/s2/sqrt(Hz)", 3e-5, (0, 1), "Random walk of the drift of that yaw"),
     real("P0_r", "rad/s", 0.001, (0, 1), "Standard deviation of that drift at the start"),
 )
+
+FAST_STATES = (State("mag_age"),)
 
 STATES = (
     State("turn", (2,)),  # cosine and sine of delta / 2
@@ -73,13 +75,24 @@ LOCALS = (
 
 def first_heading(q: Any, started: Any, u: SimpleNamespace, p: SimpleNamespace) -> Expressions:
     """STATES from one sample, delta = 0 where it has no field."""
-    field, found = rotate(q, u.mag), ca.logic_and(started, is_there(u))
+    field, found = rotate(q, u.mag), ca.logic_and(started, is_there(u, ca.logic_not(u.mag_missing)))
     return with_turn(begin(ca.if_else(found, field, 0), found, p.sample_period, p))
 
 
-def is_there(u: SimpleNamespace) -> Any:
-    """1 where the magnetometer reads a field: all zeros are none."""
-    return ca.logic_and(ca.sumsqr(u.mag) > NO_FIELD**2, ca.logic_not(u.mag_missing))
+def is_there(u: SimpleNamespace, read: Any) -> Any:
+    """1 where what was read last is a field, and was ``read`` in time: all zeros are none."""
+    return ca.logic_and(ca.sumsqr(u.mag) > NO_FIELD**2, read)
+
+
+def age(x: SimpleNamespace, u: SimpleNamespace) -> dict[str, Any]:
+    """FAST_STATES after a sample."""
+    return dict(mag_age=ca.if_else(u.mag_missing, x.mag_age + 1, 0))
+
+
+def last_field(x: SimpleNamespace, u: SimpleNamespace, w: Any, p: SimpleNamespace) -> tuple[Any, Any]:
+    """The last field of this block, in the frame of R at its end, and 1 where there was one. w: rate (rad/s), in S."""
+    since = quaternion_from_rotation_vector(-w * x.mag_age * p.sample_period)
+    return rotate(x.q, rotate(since, u.mag)), is_there(u, x.mag_age < x.samples)
 
 
 def begin(field: Any, found: Any, T: Any, p: SimpleNamespace) -> Expressions:
@@ -120,9 +133,9 @@ def wrapped(angle: Any) -> Any:
     return ca.if_else(angle > pi, angle - 2 * pi, ca.if_else(angle <= -pi, angle + 2 * pi, angle))
 
 
-def end_block(x: SimpleNamespace, u: SimpleNamespace, H: Any, p: SimpleNamespace) -> dict[str, Any]:
-    """STATES at the end of a block."""
-    field, present = rotate(x.q, u.mag), is_there(u)
+def end_block(x: SimpleNamespace, u: SimpleNamespace, w: Any, H: Any, p: SimpleNamespace) -> dict[str, Any]:
+    """STATES at the end of a block; w: rate (rad/s), in S."""
+    field, present = last_field(x, u, w, p)
     first, following = begin(field, present, H, p), filtered(field, present, x, H, p)
     return with_turn({name: ca.if_else(x.heading_started, following[name], first[name]) for name in first})
 

@@ -84,7 +84,7 @@ SLOW_STATES = (State("kappa"), State("corner"), State("clip"))
 
 def first(u: SimpleNamespace, p: SimpleNamespace) -> Expressions:
     """STATES and SLOW_STATES after the first sample."""
-    before = SimpleNamespace(gyro_used=ca.SX.zeros(3), accel_lp=ca.DM([0, 0, 1]) * p.g)
+    before = SimpleNamespace(gyro_used=ca.SX.zeros(3), size=0, accel_lp=ca.DM([0, 0, 1]) * p.g)
     read, _, _ = plausible(before, u, p)
     index = p.gyro_index
     kappa = 1 - (index > 0) * (1 - (index > 1) * (0.5 - 0.25 * (index > 2)))
@@ -93,14 +93,14 @@ def first(u: SimpleNamespace, p: SimpleNamespace) -> Expressions:
 
 def plausible(x: SimpleNamespace, u: SimpleNamespace, p: SimpleNamespace) -> tuple[dict[str, Any], Any, Any]:
     """The first four of STATES, and 1 where the gyroscope is missing, and the accelerometer."""
-    no_gyro = ca.logic_or(u.gyro_missing, largest_of(u.gyro) > WILD * p.gyro_range)
+    size = largest_of(u.gyro)
+    no_gyro = ca.logic_or(u.gyro_missing, size > WILD * p.gyro_range)
     no_accel = ca.logic_or(u.accel_missing, ca.sumsqr(u.accel) > p.accel_range**2)
-    gyro_used = ca.if_else(no_gyro, x.gyro_used, u.gyro)
     read = dict(
-        gyro_used=gyro_used,
+        gyro_used=ca.if_else(no_gyro, x.gyro_used, u.gyro),
         accel_used=ca.if_else(no_accel, x.accel_lp, u.accel),
         missing=Status.GYRO_MISSING * no_gyro + Status.ACCEL_MISSING * no_accel,
-        size=largest_of(gyro_used),
+        size=ca.if_else(no_gyro, x.size, size),
     )
     return read, no_gyro, no_accel
 
@@ -111,9 +111,10 @@ def largest_of(vector: Any) -> Any:
     return larger(larger(a, b), c)
 
 
-def is_hit(before: SimpleNamespace, x: SimpleNamespace) -> Any:
-    """1 where the accelerometer tells of a hit, whose turn no sample rate resolves."""
-    return ca.sumsqr(x.accel_used - before.accel_lp) > HIT**2
+def change_of_rate(before: SimpleNamespace, x: SimpleNamespace) -> Any:
+    """|y - y-|^2 as it counts in (3)."""
+    hit = ca.sumsqr(x.accel_used - before.accel_lp) > HIT**2
+    return ca.sumsqr(x.gyro_used - before.gyro_used) * (1 + (W_HIT - 1) * hit)
 
 
 def larger(a: Any, b: Any) -> Any:

@@ -46,6 +46,7 @@ RR_SAMPLES = 3  # at least, at a low sample rate
 RR_LONG = 2.0  # s
 W_BRISK = 1.0  # rad/s, mean of a block
 FAR = 30.0  # m/s2
+REST, OVERRULED = 1, 2  # verdicts
 T_BRISK = 10.0  # s, in which a turn is forgotten
 
 PARAMETERS = (
@@ -74,6 +75,7 @@ STATES = (
     State("still_time"),
     State("brisk"),
     State("level"),
+    State("verdict"),
     State("felt_g"),
     State("z_rest", (3,)),
 )
@@ -93,6 +95,7 @@ def first(gyro: Any, accel: Any, p: SimpleNamespace) -> Expressions:
         still_time=0,
         brisk=0,
         level=1,
+        verdict=0,
         felt_g=p.g,
         z_rest=ca.DM([0, 0, 1]),
     )
@@ -100,8 +103,8 @@ def first(gyro: Any, accel: Any, p: SimpleNamespace) -> Expressions:
 
 def sample(before: SimpleNamespace, x: SimpleNamespace, u: SimpleNamespace, p: SimpleNamespace) -> Expressions:
     """FAST_STATES after a sample."""
-    seen = before.seen + 1
-    keep = readings.smaller(p.rr_l / (p.rr_l + p.sample_period), 1 - 1 / seen)
+    time_constant = readings.smaller(p.rr_l, before.seen * p.sample_period)
+    keep = time_constant / (time_constant + p.sample_period)
     keep = ca.if_else(ca.sumsqr(x.accel_used - before.accel_lp) > FAR**2, 1, keep)
     gyro_lp = x.gyro_used + keep * (before.gyro_lp - x.gyro_used)
     accel_lp = x.accel_used + keep * (before.accel_lp - x.accel_used)
@@ -113,7 +116,10 @@ def sample(before: SimpleNamespace, x: SimpleNamespace, u: SimpleNamespace, p: S
         ca.logic_not(vehicle.wheels_turn(u)),
     )
     return dict(
-        seen=seen, gyro_lp=gyro_lp, accel_lp=accel_lp, calm_samples=ca.if_else(calm, before.calm_samples + 1, 0)
+        seen=before.seen + 1,
+        gyro_lp=gyro_lp,
+        accel_lp=accel_lp,
+        calm_samples=ca.if_else(calm, before.calm_samples + 1, 0),
     )
 
 
@@ -159,22 +165,17 @@ def is_calm(x: SimpleNamespace) -> Any:
     return ca.logic_and(x.calm_samples >= x.samples, x.calm_samples > 0)
 
 
-def lasts(x: SimpleNamespace, p: SimpleNamespace) -> Any:
-    """1 where stillness has lasted long enough for rest."""
-    least = ca.fmax(ca.if_else(x.levelled, p.rr_t, p.rr_s), RR_SAMPLES * p.sample_period)
-    enough = x.still_time > least - p.sample_period / 2
-    return ca.logic_and(is_calm(x), enough)
-
-
-def at_rest(x: SimpleNamespace, p: SimpleNamespace) -> Any:
-    """1 at rest."""
-    return ca.logic_and(lasts(x, p), x.level)
-
-
-def overruled(x: SimpleNamespace, p: SimpleNamespace) -> Any:
-    """1 where stillness that is not level shows that the attitude is wrong."""
+def verdict(x: SimpleNamespace, p: SimpleNamespace) -> Any:
+    """What calm samples mean from here on: REST, OVERRULED or nothing. They ask for it one by one."""
+    least = ca.fmax(ca.if_else(x.levelled, p.rr_t, p.rr_s), RR_SAMPLES * p.sample_period) - p.sample_period / 2
     longest = ca.if_else(is_brisk(x), RR_LONG, p.rr_o)
-    return _all(x.still_time > longest, is_calm(x), ca.logic_not(x.level))
+    overruled = ca.logic_and(x.still_time > longest, ca.logic_not(x.level))
+    return ca.if_else(ca.logic_and(x.still_time > least, x.level), REST, ca.if_else(overruled, OVERRULED, 0))
+
+
+def at_rest(x: SimpleNamespace) -> Any:
+    """1 at rest."""
+    return ca.logic_and(is_calm(x), x.verdict == REST)
 
 
 def is_brisk(x: SimpleNamespace) -> Any:

@@ -56,7 +56,7 @@ def begin(gravity: Any, p: SimpleNamespace) -> Expressions:
 
 def end_of_block(x: SimpleNamespace, H: Any, p: SimpleNamespace) -> dict[str, Any]:
     """q, v, P and STATES after a block."""
-    resting = rest.at_rest(x, p)
+    resting = rest.at_rest(x)
     g, v_N, p_gg, p_gv, p_vv = measured(x, resting, H, p)
     turn = quaternion_from_rotation_vector(to_the_top(g))  # (25)
     gravity = norm(g)
