@@ -16,6 +16,7 @@ _FACE: dict[str, tuple[str, str]] = {
     name: (module, own or name)
     for module, names in {
         "blocks.running": {"Stream": "", "Trajectory": ""},
+        "compiled.offline": {"run_offline": ""},
         "compiled.running": {"run": "", "run_plant": "simulate"},
         "benchmarks.recordings": {"benchmark": ""},
         "compiled.compilers": {"BuildError": ""},
