@@ -1,0 +1,36 @@
+"""Replay a recording through an estimator that sees all of it: forward and backward in time."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from ..blocks.block import SampledBlock
+from ..compiled.offline import run_offline
+from ..files.names import no_such
+from ..recordings.reading import Recording
+from ..registry import ESTIMATORS
+from .replay import Replay
+
+
+def replay_offline(recording: Recording, name: str, parameters: Mapping[str, Any] | None = None) -> Replay:
+    """Gyroscope and accelerometer of the recording through an estimator of imufmu in both directions.
+
+    parameters: by name; ``sample_period`` follows the recording. Raises ValueError for an estimator that cannot do so
+    and for parameters that do not fit.
+    """
+    blocks = {block.name: block for block in ESTIMATORS if isinstance(block, SampledBlock)}
+    if name not in blocks:
+        raise ValueError(no_such("estimator", name, list(blocks), "an FMU runs forward only"))
+    block, readings = blocks[name], recording.at_instants()
+    inputs = {signal.name: readings[signal.name] for signal in block.inputs if signal.name in ("gyro", "accel")}
+    found = run_offline(block, inputs, {**(parameters or {}), "sample_period": recording.sample_period})
+    units = {signal.name: signal.unit for signal in block.outputs}
+    columns: dict[str, np.ndarray] = {}
+    for signal_name, values in found.values.items():
+        rows = values[recording.sample_index]
+        parts = {signal_name: rows} if rows.ndim == 1 else {f"{signal_name}[{i + 1}]": rows[:, i] for i in range(3)}
+        columns |= parts
+    return Replay(recording, name, columns, {c: units[c.split("[")[0]] for c in columns}, recording.notes)
