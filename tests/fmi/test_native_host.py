@@ -82,7 +82,16 @@ def host(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @needs("POSIX")
-@pytest.mark.parametrize("name", [*BLOCKS, "imu+lee2012", "pendulum+imu+lee2012", "handheld+imu+plumb"])
+# The last one takes a compilation of a minute.
+@pytest.mark.parametrize(
+    "name",
+    [
+        *BLOCKS,
+        "imu+lee2012",
+        "pendulum+imu+lee2012",
+        pytest.param("handheld+imu+plumb", marks=pytest.mark.slow),
+    ],
+)
 def test_a_c_program_gets_the_numbers_of_the_run_in_process(name: str, host: Path, tmp_path: Path) -> None:
     """Bit for bit: the same operations in the same order, the same C library."""
     assert np.array_equal(in_host(name, [], host, tmp_path, own_platform()), in_process(name))
