@@ -14,11 +14,11 @@ test: $(VENV)/installed
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
-	$(BIN)/pytest -n auto --durations=10
+	$(BIN)/pytest -n auto --dist loadfile --durations=10
 	IMUFMU_RECORDINGS=none $(BIN)/pytest -m recordings
 
 test-slow: test
-	$(BIN)/pytest -n auto -m slow
+	$(BIN)/pytest -n auto --dist loadfile -m slow
 
 $(VENV)/installed: pyproject.toml
 	$(PYTHON) -m venv $(VENV)
