@@ -15,7 +15,7 @@ ROOMS = (
     ("scoring", "errors of an estimate against the truth"),
     ("cosim", "system description in, results out"),
     ("fmi", "a block becomes an FMU; doctor"),
-    ("compiled", "a block becomes C; compilers"),
+    ("compiled", "a block becomes C and runs as C"),
     ("registry", "the list of blocks"),
     ("estimators, sensors, plants", "one block, one file"),
     ("recordings", "logs of others, clocks, units"),

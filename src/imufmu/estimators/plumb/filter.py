@@ -166,7 +166,7 @@ Where it is weak: a vehicle that gathers speed in its first seconds, with no res
 acceleration that sets in more gently than 0.1 m/s2 in a second and free of any turn is taken for rest in part, and
 becomes tilt. A turn about the vertical slower than rr_b is taken for bias. Aircraft, centrifuges and ships in a long
 turn, without forward_speed: velocity changes for minutes on end there. A saturated accelerometer is not noticed.""",
-    reference="Model of velocity: T. Rizun, Journal of Navigation 61, 2008, doi:10.1017/S0373463308004736",
+    reference="Model of velocity: P. Rizun, Journal of Navigation 61, 2008, doi:10.1017/S0373463308004736",
     when="""Use it first: it needs no tuning, finds the bias of the gyroscope, and tells by tilt_std how far to trust
 it. In a vehicle connect the speed of its wheels.
 Instead: rizun2008 where a linear filter with a known frequency response is asked for; lee2012 or leechoi2018 as
