@@ -16,7 +16,9 @@ if TYPE_CHECKING:
 
 def validate(
     papers: Annotated[list[str] | None, typer.Argument(help="Papers, by the names of their estimators; or all")] = None,
-    quick: Annotated[bool, typer.Option("--quick", help="Fewer random motions: less than a minute instead of some.")] = False,
+    quick: Annotated[
+        bool, typer.Option("--quick", help="Fewer random motions: under a minute instead of some.")
+    ] = False,
     report: Annotated[Path | None, typer.Option("--report", help="Write an HTML report to this file.")] = None,
     junit: Annotated[
         Path | None, typer.Option("--junit", help="Write the checks to this .xml file, for a CI server.")
