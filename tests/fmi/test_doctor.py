@@ -41,7 +41,12 @@ def problems(path: Path) -> dict[str, str]:
     return {f.topic: f.text for f in examine(path) if f.level is Level.PROBLEM}
 
 
-@pytest.mark.parametrize("name", BLOCKS)
+# A trial takes seconds. These have slow steps, noise, a solver; the others are tried among the slow tests.
+BRIEFLY = ("plumb", "imu", "pendulum")
+EACH = [pytest.param(name, marks=() if name in BRIEFLY else pytest.mark.slow) for name in BLOCKS]
+
+
+@pytest.mark.parametrize("name", EACH)
 def test_our_own_native_fmus_have_no_problem_need_no_python_and_take_a_step(name):
     findings = examine(cached_native_fmu(name))
     assert [f for f in findings if f.level is Level.PROBLEM] == []
@@ -49,7 +54,7 @@ def test_our_own_native_fmus_have_no_problem_need_no_python_and_take_a_step(name
     assert not any("Python" in f.topic + f.text for f in findings)
 
 
-@pytest.mark.parametrize("name", BLOCKS)
+@pytest.mark.parametrize("name", EACH)
 def test_our_own_fmus_have_no_problem_and_take_a_step(name):
     findings = examine(cached_fmu(name))
     assert [f for f in findings if f.level is Level.PROBLEM] == []

@@ -83,6 +83,7 @@ def test_plumb_keeps_the_vertical_in_a_car(system: str) -> None:
     assert found["plumb_alone"] < min(found[name] for name in PAPERS)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("system", SYSTEMS)
 def test_a_device_from_the_factory_costs_plumb_less_than_half_of_what_it_costs_the_papers_filters(system: str) -> None:
     """Without the wheels. Two axes of 50 mg at three sigma alone are 1.35 deg, which nothing can observe."""
