@@ -17,6 +17,7 @@ from typing import IO
 _SHOWN = 64 * 1024  # bytes of output handed on
 _TAIL = 2048  # bytes kept for messages
 _QUOTED = 3  # lines
+_AWAKE = 1e-4  # s without sleep while an answer is awaited: to fall asleep and be woken takes longer than most steps
 _GRACE = 2.0  # s to end after the pipes were closed
 
 Listener = Callable[[bytes], None]
@@ -150,4 +151,14 @@ else:
         """Whether there is something to read, or the end, within seconds."""
         poll = select.poll()
         poll.register(pipe, select.POLLIN)
-        return lambda seconds: bool(poll.poll(1000 * seconds))
+        give_way = getattr(os, "sched_yield", lambda: None)  # macOS has none
+
+        def ready(seconds: float) -> bool:
+            sleep_at = time.perf_counter() + min(seconds, _AWAKE)
+            while time.perf_counter() < sleep_at:
+                if poll.poll(0):
+                    return True
+                give_way()
+            return bool(poll.poll(1000 * seconds))
+
+        return ready
