@@ -135,6 +135,13 @@ def test_a_stop_time_between_communication_points_is_passed_by_the_last_step(tmp
     assert simulate(system, stop_time=0.3, step=0.1).time[-1] == pytest.approx(0.3)  # 0.3 / 0.1 is above 3 by rounding
 
 
+def test_rounding_of_times_far_from_zero_adds_no_step(tmp_path: Path) -> None:
+    system = chain(tmp_path, "clock.y -> sampler.u")
+    start, h = 1.7e9 + 0.3, 0.01
+    steps = next(k for k in range(1, 100) if (start + k * h - start) / h > k + 1e-6)
+    assert len(simulate(system, start_time=start, stop_time=start + steps * h, step=h).time) == steps + 1
+
+
 def test_parameters_come_from_the_description_and_give_way_to_the_argument(tmp_path: Path) -> None:
     own = binding({"offset": ("Real", 10, None), "start_steps": ("Integer", 7, None)})
     of_system = binding({"clock.offset": ("Real", 20, None)})

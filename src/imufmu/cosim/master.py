@@ -131,7 +131,8 @@ def _ticks(system: System, start: float | None, stop: float | None, h: float | N
     count = (stop - start) / h
     if count > MOST_TICKS:
         raise ValueError(f"{count:.3g} steps of {h:g} s are too many; are the times in seconds?")
-    return Ticks(start, h, max(1, math.ceil(count - 1e-6)))  # rounding of stop / h is no further step
+    rounding = 1e-6 + math.ulp(max(abs(start), abs(stop))) / h  # of stop / h and, far from time zero, of the times
+    return Ticks(start, h, max(1, math.ceil(count - rounding)))
 
 
 def _is_sampled(part: Part) -> bool:
