@@ -60,6 +60,10 @@ def _libpython() -> str:
 _PARTS: dict[str, Callable[[], str]] = {
     "imufusion": lambda: _package("imufusion"),
     "vqf": lambda: _package("vqf"),
+    "pandas": lambda: _package("pandas"),
+    "xarray": lambda: _package("xarray"),
+    "nbclient": lambda: _package("nbclient"),
+    "ipykernel": lambda: _package("ipykernel"),
     "ziglang": lambda: _package("ziglang"),
     "fmpy": lambda: _host("fmpy"),
     "libcosim": lambda: _host("libcosimpy"),

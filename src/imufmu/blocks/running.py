@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import Any
 
 import numpy as np
 
 from .block import Block, ContinuousBlock, SampledBlock
+from .columns import Columns, Tabular, element_names
 from .instance import LONGEST_STEP, SampledInstance, StepError, chain_diverged, diverged, solver_steps
 from .noise import draws
 from .signals import Signal, State, total_size
@@ -19,17 +20,25 @@ _PORTION = 64 * _CHUNK  # samples whose noise is drawn at a time
 
 
 @dataclass(frozen=True)
-class Trajectory:
-    """Signals over time. time: (n,), s. values: by signal name, (n,), (n, 3) or (n, 3, 3), in the signal's unit."""
+class Trajectory(Tabular):
+    """Signals over time. time: (n,), s. values: by signal name, (n,), (n, 3) or (n, 3, 3), in the signal's unit.
+
+    units: by signal name, where they are known.
+    """
 
     time: np.ndarray
     values: Mapping[str, np.ndarray]
+    units: Mapping[str, str | None] = field(default_factory=dict)
 
     def __getitem__(self, name: str) -> np.ndarray:
         return self.values[name]
 
     def __repr__(self) -> str:
         return f"<Trajectory of {len(self.time)} rows: {', '.join(self.values)}>"
+
+    def _table(self) -> Columns:
+        columns = {name: element_names(name, values.shape[1:]) for name, values in self.values.items()}
+        return Columns("trajectory", self.time, self.values, columns, self.units)
 
 
 # (block, state behind a sample, u, p, w of the samples that follow) -> (state behind the last one, y)
@@ -111,7 +120,7 @@ def run(
     time = start_time + np.arange(n) * period
     if block.has_solver and not np.isfinite(y).all():
         raise StepError(chain_diverged(block, time[np.argmin(np.isfinite(y).all(axis=1))], period))
-    return Trajectory(time, _by_name(block.reported, y))
+    return Trajectory(time, _by_name(block.reported, y), {signal.name: signal.unit for signal in block.reported})
 
 
 def simulate(
@@ -144,7 +153,7 @@ def simulate(
     bad = np.flatnonzero(~np.isfinite(np.hstack([y, states])).all(axis=1))
     if bad.size:
         raise StepError(diverged(block, time[bad[0]], p[_names(block).index("max_step")]))
-    return Trajectory(time, _by_name(block.reported, y))
+    return Trajectory(time, _by_name(block.reported, y), {signal.name: signal.unit for signal in block.reported})
 
 
 class Stream:

@@ -50,7 +50,7 @@ def run_offline(
     vertical = both / np.linalg.norm(both, axis=1, keepdims=True)
     roll, pitch = over_rows(roll_pitch, vertical).T
     values = {"vertical": vertical, "roll": roll, "pitch": pitch, "tilt_std": sum(weights) ** -0.5}
-    return Trajectory(forward.time, values)
+    return Trajectory(forward.time, values, {name: forward.units[name] for name in values})
 
 
 def _backward(name: str, value: Any, shape: tuple[int, ...] | None, shift: int) -> np.ndarray:

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from ..blocks.columns import Columns, Tabular
 from ..blocks.vocabulary import ACCEL, FORWARD_SPEED, GYRO, MAG
 from ..files.atomic import check_not_read
 from ..files.csv_table import write_csv
@@ -36,7 +37,7 @@ _SAME_PERIOD = 1e-6  # relative; a larger deviation would shift the sample clock
 
 
 @dataclass(frozen=True, eq=False)
-class Replay:
+class Replay(Tabular):
     """Outputs of an estimator over a recording, one row per row of the file.
 
     estimator: its name. columns: (n,) by FMU variable name, in the order of the FMU. units: by variable name. notes:
@@ -73,6 +74,9 @@ class Replay:
         columns = {f"{self.estimator}.{name}": column for name, column in self.columns.items()}
         units = {f"{self.estimator}.{name}": unit for name, unit in self.units.items()}
         return Result(self.recording.name, self._time, columns, units, self.notes, self.partial).to_hdf5(path)
+
+    def _table(self) -> Columns:
+        return Result(self.recording.name, self._time, self.columns, self.units, self.notes, self.partial)._table()
 
     @property
     def _time(self) -> np.ndarray:

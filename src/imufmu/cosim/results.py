@@ -16,6 +16,7 @@ from typing import Any
 import h5py
 import numpy as np
 
+from ..blocks.columns import Columns, Tabular
 from ..files.csv_table import write_csv
 from ..files.hdf5_table import Dataset, write_hdf5
 from .interface import near
@@ -24,7 +25,7 @@ _ELEMENT = re.compile(r"(.+)\[(\d+(?:,\d+)*)\]")
 
 
 @dataclass(frozen=True, eq=False)
-class Result:
+class Result(Tabular):
     """Variables over communication points.
 
     system: its name. time: (n,), s. columns: (n,) by ``component.variable``, float64, or int32 for Integer and Boolean
@@ -56,9 +57,8 @@ class Result:
             return self.columns[name]
         if name not in self._arrays:
             raise KeyError(f"{name!r} was not recorded. Near: {near(name, [*self.columns, *self._arrays])}")
-        shape = self._arrays[name]
-        elements = [self.columns[_element(name, index)] for index in np.ndindex(shape)]
-        return np.stack(elements, axis=-1).reshape(-1, *shape)
+        elements = [self.columns[column] for column in self._elements(name)]
+        return np.stack(elements, axis=-1).reshape(-1, *self._arrays[name])
 
     def __contains__(self, name: str) -> bool:
         return name in self.columns or name in self._arrays
@@ -106,6 +106,18 @@ class Result:
         if self.partial:
             attributes["partial"] = self.partial
         return write_hdf5(path, attributes, chain([Dataset(["time"], self.time, "s")], variables))
+
+    def _table(self) -> Columns:
+        """Vectors as one signal each."""
+        signals = {name: self[name] for name, _ in self._datasets()}
+        columns = {name: [name] if name in self.columns else self._elements(name) for name in signals}
+        units = {name: self.units.get(columns[name][0]) for name in signals}
+        remarks = {"notes": list(self.notes), "partial": self.partial}
+        return Columns(self.system, self.time, signals, columns, units, remarks)
+
+    def _elements(self, name: str) -> list[str]:
+        """Columns of a vector or matrix, row by row."""
+        return [_element(name, index) for index in np.ndindex(self._arrays[name])]
 
     def _datasets(self) -> Iterator[tuple[str, str]]:
         """Names of whole vectors and of other columns, in order, each with its first column."""

@@ -82,8 +82,8 @@ def _compare(result: Result, plant: str, component: str, notes: list[str]) -> Co
     time = result.time[rows]
     return Comparison(
         component,
-        Trajectory(time, true_then),
-        Trajectory(time, at_samples),
+        Trajectory(time, true_then, _units(result, plant, true_then)),
+        Trajectory(time, at_samples, _units(result, component, at_samples)),
         errors,
         metrics.summary(errors),
         float(np.mean(result.time[rows_hat] - at_samples["sample_time"])),
@@ -105,3 +105,9 @@ def leave_out_unequal(
 
 def _signals(result: Result, component: str) -> dict[str, np.ndarray]:
     return {name: result[f"{component}.{name}"] for name in _COMPARED if f"{component}.{name}" in result}
+
+
+def _units(result: Result, component: str, signals: Iterable[str]) -> dict[str, str | None]:
+    """Units of signals, those of vectors from their first element."""
+    names = {name: f"{component}.{name}" for name in signals}
+    return {name: result.units.get(full, result.units.get(f"{full}[1]")) for name, full in names.items()}
