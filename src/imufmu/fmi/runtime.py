@@ -15,13 +15,14 @@ PACKAGE = Path(__file__).parents[1]
 
 _MODULES = ("__init__", "fmi/__init__", "fmi/slave", "fmi/component", "fmi/runtime", "fmi/saved_state", "fmi/wrapper")
 _FOLDERS = ("blocks", "estimators", "plants", "sensors")
+_AT_HOME = ("blocks/drawing",)  # an FMU draws nothing, and its host need not have what draws
 
 
 def files(package: Path) -> list[Path]:
     """The runtime's source files below a copy of the package, as relative paths."""
     fixed = [Path(f"{module}.py") for module in _MODULES]
     blocks = [path.relative_to(package) for folder in _FOLDERS for path in (package / folder).rglob("*.py")]
-    return sorted([*fixed, *blocks])
+    return sorted({*fixed, *blocks} - {Path(f"{module}.py") for module in _AT_HOME})
 
 
 def copy_to(folder: Path) -> None:
