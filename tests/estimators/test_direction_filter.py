@@ -13,7 +13,7 @@ from imufmu.estimators.direction_filter import LARGEST_TRACE, predict, tilt_std,
 
 Z = np.array([2.0, -1.0, 2.0]) / 3
 ACROSS = np.linalg.svd(Z[None, :])[2][1:]  # two unit vectors square to Z and to each other
-P_OF = SimpleNamespace(sample_period=ca.DM(0.01), sigma_g2=ca.DM(1e-4))
+P_OF = SimpleNamespace(sample_period=ca.DM(0.01), sigma_g2=ca.DM(1e-4), model_error=ca.DM(0), g=ca.DM(9.8))
 
 
 def numbers(expression: object) -> np.ndarray:
@@ -28,9 +28,9 @@ def random_covariance(rng: np.random.Generator, sizes: tuple[float, float, float
 
 def test_an_error_along_the_vertical_is_no_tilt_and_one_across_it_is() -> None:
     along, (one, other) = np.outer(Z, Z), (np.outer(a, a) for a in ACROSS)
-    assert float(tilt_std(ca.DM(Z), ca.DM(1e-2 * along))) < 1e-8  # root of the rounding of 0.01
-    assert float(tilt_std(ca.DM(Z), ca.DM(9e-4 * one))) == pytest.approx(0.03)
-    assert float(tilt_std(ca.DM(Z), ca.DM(9e-4 * one + 16e-4 * other + along))) == pytest.approx(0.05)
+    assert float(tilt_std(ca.DM(Z), ca.DM(1e-2 * along), P_OF)) < 1e-8  # root of the rounding of 0.01
+    assert float(tilt_std(ca.DM(Z), ca.DM(9e-4 * one), P_OF)) == pytest.approx(0.03)
+    assert float(tilt_std(ca.DM(Z), ca.DM(9e-4 * one + 16e-4 * other + along), P_OF)) == pytest.approx(0.05)
 
 
 def test_an_update_is_that_of_the_textbook(rng: np.random.Generator) -> None:
@@ -85,4 +85,4 @@ def test_an_update_after_a_long_gap_leaves_every_eigenvalue_positive(rng: np.ran
         _, predicted = predict(ca.DM(Z), ca.DM(P), ca.DM(rng.normal(0, 30, 3)), P_OF)
         _, after, _ = update(ca.DM(Z), predicted, ca.DM(9.8 * Z), ca.DM(1e-4), 9.8, ca.DM(1))
         assert np.linalg.eigvalsh(numbers(after))[0] > 0
-        assert math.isfinite(float(tilt_std(ca.DM(Z), after)))
+        assert math.isfinite(float(tilt_std(ca.DM(Z), after, P_OF)))

@@ -25,7 +25,13 @@ Then Z+ is given unit length, and what gravity leaves of the reading is the exte
     z = y_A - c_a a+,   sigma^2 = c_a^2 |a+|^2 / 3 + sigma_A^2                               (18), (23)
     a+ = y_A - g Z+                                                                          (29)
 
-A block that uses this module declares GYRO_VARIANCE and GYRO_INDEX, and ACCEL_VARIANCE and GRAVITY for the vertical.
+An acceleration that lasts is not in that model: (27) takes it over whole, sooner or later, and P does not know. Where
+the user says how large it may be, sigma_m on each axis, the one-sigma tilt does:
+
+    tilt_std^2 = tr P - Z' P Z + 2 (sigma_m / g)^2
+
+A block that uses this module declares GYRO_VARIANCE and GYRO_INDEX, and for the vertical ACCEL_VARIANCE, GRAVITY and
+MODEL_ERROR.
 
 [1] Lee, Park, Robinovitch, Estimation of Attitude and External Acceleration Using Inertial Sensor Measurement During
     Various Dynamic Conditions, IEEE TIM 61(8), 2012, doi:10.1109/TIM.2012.2187245
@@ -53,6 +59,14 @@ ACCEL_VARIANCE = real(
     "sigma_a2", "m2/s4", 1e-4, (1e-9, 1e6), "Accelerometer variance per sample; larger trusts it less", tunable=True
 )
 GRAVITY = real("g", "m/s2", 9.8, (1, 100), "Magnitude of gravity; 9.8 as in Lee et al. 2012")
+MODEL_ERROR = real(
+    "model_error",
+    "m/s2",
+    0.0,
+    (0, 100),
+    "sigma_m: lasting acceleration that the model does not know, per axis; adds to tilt_std only",
+    tunable=True,
+)
 GYRO_INDEX = integer(
     "gyro_index", 0, (0, 2), "Gyroscope sample of the prediction: 0 previous (as printed), 1 current, 2 mean"
 )
@@ -122,6 +136,11 @@ def vertical_step(
     return Z, a, P, ca.if_else(u.accel_missing, 0, innovation)
 
 
-def tilt_std(Z: Any, P: Any) -> Any:
-    """One-sigma tilt (rad) from the covariance of the up vector Z: its part perpendicular to the vector."""
-    return root(ca.trace(P) - Z.T @ P @ Z)
+def tilt_std(Z: Any, P: Any, p: SimpleNamespace, length: Any = 1) -> Any:
+    """One-sigma tilt (rad): by the covariance P of the vertical, its part across the unit vector Z, and by what the
+    model does not know.
+
+    length: of the vertical, in the unit of P's root.
+    """
+    across = (ca.trace(P) - Z.T @ P @ Z) / length**2
+    return root(across + 2 * (p.model_error / p.g) ** 2)

@@ -41,6 +41,7 @@ from .direction_filter import (
     GRAVITY,
     GYRO_INDEX,
     GYRO_VARIANCE,
+    MODEL_ERROR,
     first_acceleration,
     first_vertical,
     has_vertical,
@@ -93,7 +94,7 @@ def output(x: SimpleNamespace, u: SimpleNamespace, p: SimpleNamespace) -> Expres
         pitch=pitch,
         vertical=x.Z,
         external_acceleration=x.a,
-        tilt_std=tilt_std(x.Z, x.P),
+        tilt_std=tilt_std(x.Z, x.P, p),
         status=v.Status.GYRO_MISSING * u.gyro_missing
         + v.Status.ACCEL_MISSING * u.accel_missing
         + v.Status.ACCEL_REJECTED * x.rejected
@@ -110,7 +111,8 @@ BLOCK = SampledBlock(
 models the external acceleration as low-pass filtered noise: good for short accelerations. Mode 2 takes every
 accelerometer sample for gravity: for quasi-static use only. Mode 3 uses the accelerometer only after its norm stayed
 near g for n samples. The filter has no gyroscope bias state: remove a constant bias first. Sustained acceleration
-(cornering, braking) tilts the estimate in every mode. Heading is not estimated.""",
+(cornering, braking) tilts the estimate in every mode, and tilt_std tells of it only where model_error says how large it
+may be. Heading is not estimated.""",
     reference="J. K. Lee, E. J. Park, S. N. Robinovitch, IEEE Transactions on Instrumentation and Measurement 61(8), "
     "2012, doi:10.1109/TIM.2012.2187245",
     when="""Use it on a hand, a limb or a tool that accelerates in short bursts with rest or gentle motion between
@@ -131,6 +133,7 @@ heading.""",
         real("c_a", "1", 0.1, (0, 1), "Mode 1: part of the acceleration kept to the next sample", tunable=True),
         GYRO_VARIANCE,
         ACCEL_VARIANCE,
+        MODEL_ERROR,
         GRAVITY,
         real(
             "eps_a",

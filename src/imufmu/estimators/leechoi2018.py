@@ -47,6 +47,7 @@ from .direction_filter import (
     GYRO_INDEX,
     GYRO_VARIANCE,
     LARGEST_TRACE,
+    MODEL_ERROR,
     first_vertical,
     has_vertical,
     rate,
@@ -144,7 +145,7 @@ def output(x: SimpleNamespace, u: SimpleNamespace, p: SimpleNamespace) -> Expres
         pitch=pitch,
         vertical=Z,
         external_acceleration=x.a,
-        tilt_std=tilt_std(Z, x.P[:3, :3]) / norm(x.g),
+        tilt_std=tilt_std(Z, x.P[:3, :3], p, norm(x.g)),
         status=v.Status.GYRO_MISSING * u.gyro_missing
         + v.Status.ACCEL_MISSING * u.accel_missing
         + v.Status.NOT_INITIALISED * (1 - x.started),
@@ -182,6 +183,7 @@ bias or the acceleration lasts, as in a vehicle; plumb or zihajehzadeh2014 for h
         real("c_b", "m/s2", 0.1, (0, 100), "New acceleration per sample, standard deviation", tunable=True),
         GYRO_VARIANCE,
         ACCEL_VARIANCE,
+        MODEL_ERROR,
         real("g", "m/s2", 9.8, (1, 100), "Magnitude of gravity; 9.8 is the value of Lee et al. 2012"),
         switch("normalise", "0 gravity as the filter leaves it (as printed), 1 scaled to length g after every sample"),
         real("P0", "m2/s4", 1.0, (0, 1e5), "Variance of gravity and acceleration at the start, each axis"),

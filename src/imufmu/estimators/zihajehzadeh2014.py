@@ -59,6 +59,7 @@ from .direction_filter import (
     GYRO_VARIANCE,
     LARGEST_LENGTH,
     LARGEST_TRACE,
+    MODEL_ERROR,
     NO_DIRECTION,
     first_acceleration,
     first_vertical,
@@ -191,7 +192,7 @@ def output(x: SimpleNamespace, u: SimpleNamespace, p: SimpleNamespace) -> Expres
         q_NS=quaternion_from_euler(roll, pitch, yaw),
         vertical=vertical,
         external_acceleration=x.a,
-        tilt_std=tilt_std(vertical, x.P1),
+        tilt_std=tilt_std(vertical, x.P1, p),
         status=v.Status.GYRO_MISSING * u.gyro_missing
         + v.Status.ACCEL_MISSING * u.accel_missing
         + v.Status.MAG_MISSING * u.mag_missing
@@ -255,6 +256,7 @@ the tilt; lee2012 in mode 1 for the tilt alone, which is the same.""",
         real("c_a", "1", 0.3, (0, 1), "Part of the external acceleration kept to the next sample", tunable=True),
         GYRO_VARIANCE,
         ACCEL_VARIANCE,
+        MODEL_ERROR,
         real(
             "sigma_m2",
             "1",
