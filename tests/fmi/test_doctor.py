@@ -6,6 +6,7 @@ import zipfile
 from collections.abc import Callable
 from pathlib import Path
 
+import fmpy
 import pytest
 
 from imufmu.compiled.compilers import PLATFORMS
@@ -14,6 +15,7 @@ from imufmu.fmi.build import cached_fmu
 from imufmu.fmi.doctor import Level, examine
 from imufmu.fmi.native import cached_native_fmu
 from imufmu.registry import BLOCKS
+from support.rocker import rocker
 
 
 @pytest.fixture
@@ -183,3 +185,36 @@ class Lee2012(Fmi2Slave):
     (trial,) = (f for f in findings if f.topic == "one step")
     assert trial.level is Level.NOTE
     assert trial.text.startswith("works on this machine, but when closed it crashed its process (SIGABRT)")
+
+
+def test_an_fmu_3_is_told_what_runs_it():
+    """Its folders have other names than those of FMI 2.0, which is no reason for a host not to run on them."""
+    texts = {f.topic: f.text for f in examine(rocker("3_cs"))}
+    assert texts["kind"] == "FMI 3.0, co-simulation and model exchange"
+    assert texts["imufmu"] == "runs it as a component of a system on this machine"
+    assert texts["one step"] == "works on this machine."
+    if fmpy.platform_tuple == "x86_64-linux":
+        assert texts["Simulink"] == "64-bit Linux; needs a release that reads FMI 3.0"
+        assert texts["OpenModelica"] == "64-bit Linux; needs an FMU 2.0"
+    assert problems(rocker("3_cs")) == {}
+
+
+@pytest.mark.parametrize("kind", ["3_me", "2_me"])
+def test_an_fmu_for_model_exchange_runs_by_a_solver(kind):
+    texts = {f.topic: f.text for f in examine(rocker(kind))}
+    assert texts["kind"] == f"FMI {kind[0]}.0, model exchange"
+    assert texts["imufmu"].endswith("on this machine, its equations solved by CVode of FMPy")
+    assert texts["one step"] == "works on this machine."
+
+
+def test_scheduled_execution_is_nothing_that_a_host_is_promised_for(tmp_path):
+    path = tmp_path / "scheduled.fmu"
+    with zipfile.ZipFile(rocker("3_me")) as source, zipfile.ZipFile(path, "w") as target:
+        for name in source.namelist():
+            target.writestr(name, source.read(name).replace(b"<ModelExchange", b"<ScheduledExecution"))
+    texts = {f.topic: f.text for f in examine(path)}
+    assert texts["kind"] == "FMI 3.0, scheduled execution"
+    assert texts["imufmu"].startswith("does not run it: for scheduled execution only")
+    assert texts["hosts"].startswith("for scheduled execution, which none of Simulink, ")
+    assert "Simulink" not in texts
+    assert problems(path) == {}

@@ -8,11 +8,14 @@ from pathlib import Path
 from typing import Any
 
 from ..files.scratch import scratch_folder
-from ..fmi.archive import open_fmu
+from ..fmi.archive import interface_of, open_fmu
 from .guest import Guest
-from .slave import Slave, Unpacked, forget_paths
+from .kinds import slave_of
+from .slave import Equations, Slave, Unpacked, forget_paths
 
 Instance = Slave | Guest
+
+_TOLERANCE = 1e-6  # relative, of solved equations, where an FMU does not want less: errors are measured against them
 
 
 class Instances:
@@ -36,7 +39,7 @@ class Instances:
         unpacked = self._unpack(fmu, model)
         instance: Instance
         if ours or self._in_process:
-            instance = Slave(name, unpacked)
+            instance = slave_of(name, unpacked)
         else:
             folder = self._scratch / f"process{self._guests}"
             folder.mkdir()
@@ -50,5 +53,18 @@ class Instances:
             folder = self._scratch / str(len(self._unpacked))
             folder.mkdir()
             library, _ = open_fmu(fmu, folder)
-            self._unpacked[fmu] = Unpacked(library, folder, model.guid, model.coSimulation.modelIdentifier)
+            identifier, version = interface_of(model).modelIdentifier, model.fmiMajorVersion
+            equations = None if model.coSimulation else _equations(model)
+            self._unpacked[fmu] = Unpacked(library, folder, model.guid, identifier, version, equations)
         return self._unpacked[fmu]
+
+
+def _equations(model: Any) -> Equations:
+    experiment = model.defaultExperiment
+    declared = float(experiment.tolerance) if experiment and experiment.tolerance else _TOLERANCE
+    return Equations(
+        model.numberOfContinuousStates,
+        model.numberOfEventIndicators,
+        min(declared, _TOLERANCE) if declared > 0 else _TOLERANCE,
+        model.modelExchange.needsCompletedIntegratorStep,
+    )

@@ -15,7 +15,7 @@ import numpy as np
 from ..fmi.child import Child
 from .errors import SimulationError
 from .settings import Setting
-from .slave import CALLS, DO_STEP, Inlet, Inputs, Outlet, Unpacked, quoted, when
+from .slave import CALLS, STEPS, Inlet, Inputs, Outlet, Unpacked, Variable, quoted, when
 from .wire import Numbers, Shared, Verb, receive_answer, send_command
 
 _START_TIMEOUT = 60.0  # s, of Python itself, however short the user's patience with the FMU
@@ -72,6 +72,8 @@ class Guest:
             "folder": str(self._fmu.folder),
             "guid": self._fmu.guid,
             "identifier": self._fmu.identifier,
+            "version": self._fmu.version,
+            "equations": self._fmu.equations,
             "path": [entry for entry in sys.path if entry],
             "memory": str(memory),
             "inlets": [_end(inlet) for inlet in inlets],
@@ -86,7 +88,7 @@ class Guest:
 
     def enter_initialisation(self, settings: Sequence[Setting], start_time: float) -> None:
         """Apply the start values and enter initialization mode."""
-        starts = [((s.variable.name, s.variable.valueReference), s.value) for s in settings]
+        starts = [(Variable.of(s.variable), s.value) for s in settings]
         self._request(Verb.ENTER, start_time, data=starts)
 
     def exit_initialisation(self, time: float) -> None:
@@ -174,7 +176,11 @@ class Guest:
         time, h, reached = self._times
         number = self._shared.now.value
         call = CALLS[number] if 0 <= number < len(CALLS) else "a call"
-        at = when(time, h) if number == DO_STEP else when(reached if call.startswith("fmi2Get") else time)
+        at = (
+            when(time, h)
+            if call in STEPS
+            else when(reached if call[:4] in ("fmi2", "fmi3") and call[4:7] == "Get" else time)
+        )
         self._gone = True
         self._child.kill()
         said = self._shared.said or self._child.last_lines.replace("\n", " | ")
@@ -182,7 +188,7 @@ class Guest:
 
 
 def _end(end: Inlet | Outlet) -> dict[str, Any]:
-    return {"kind": end.kind, "variables": [(v.name, v.valueReference) for v in end.variables]}
+    return {"kind": end.kind, "variables": [Variable.of(v) for v in end.variables]}
 
 
 def _hand_on(output: bytes) -> None:

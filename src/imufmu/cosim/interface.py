@@ -38,7 +38,7 @@ class Interface:
 
 
 def representation(variable: Any) -> str:
-    """The FMI type that carries the variable's value: Real, Integer, Boolean or String."""
+    """The type that carries the variable's value: Real, Integer, Boolean or String; Binary and Clock carry none."""
     return "Integer" if variable.type == "Enumeration" else variable.type
 
 

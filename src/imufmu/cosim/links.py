@@ -122,8 +122,8 @@ def _misfits(link: Link, connection: Connection, interfaces: Mapping[str, Interf
     kind = representation(source)
     if kind != representation(target):
         return [f"types differ: {source.type} and {target.type}"]
-    if kind == "String":
-        return ["String variables cannot be connected"]
+    if kind not in ("Real", "Integer", "Boolean"):
+        return [f"{kind} variables cannot be connected"]
     if kind != "Real":
         scaled = (link.factor, link.offset) != (1.0, 0.0)
         return [f"a LinearTransformation needs Real variables, not {kind}"] if scaled else []

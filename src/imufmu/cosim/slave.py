@@ -9,12 +9,12 @@ from __future__ import annotations
 import importlib
 import os
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from ctypes import POINTER, c_char_p, c_double, c_int, c_uint
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from fmpy.fmi1 import FMICallException
@@ -28,36 +28,79 @@ if TYPE_CHECKING:
 
 DTYPES: dict[str, Any] = {"Real": np.float64, "Integer": np.int32, "Boolean": np.int32}
 _POINTERS: dict[str, Any] = {"Real": POINTER(c_double), "Integer": POINTER(c_int), "Boolean": POINTER(c_int)}
-_KINDS = {float: "Real", bool: "Boolean", int: "Integer"}
-_GOOD = (fmi2OK, fmi2Warning)
+KINDS = {float: "Real", bool: "Boolean", int: "Integer"}
+GOOD = (fmi2OK, fmi2Warning)  # as in FMI 3.0, whose statuses have the same numbers
+
+# FMI 3.0 has a function per type, for whole arrays.
+WIRES = ("Float32", "Float64", *(f"{sign}Int{bits}" for sign in ("", "U") for bits in (8, 16, 32, 64)), "Boolean")
 
 # Everything that may crash or hang, by number, so that another process can be told what is going on.
+INTEGRATION = "integration of its equations"
 CALLS = (
     "start",
     "load of its script",
     "load of its binary",
-    "fmi2Instantiate",
+    INTEGRATION,
     *(f"fmi2{verb}{kind}" for verb in ("Set", "Get") for kind in (*DTYPES, "String")),
+    *(f"fmi3{verb}{kind}" for verb in ("Set", "Get") for kind in (*WIRES, "String")),
     "fmi2SetupExperiment",
-    "fmi2EnterInitializationMode",
-    "fmi2ExitInitializationMode",
-    "fmi2DoStep",
-    "fmi2Terminate",
-    "fmi2FreeInstance",
+    *(
+        f"fmi{version}{call}"
+        for version in (2, 3)
+        for call in (
+            "Instantiate",
+            "EnterInitializationMode",
+            "ExitInitializationMode",
+            "DoStep",
+            "Terminate",
+            "FreeInstance",
+        )
+    ),
 )
-DO_STEP = CALLS.index("fmi2DoStep")
+_DO_STEP = CALLS.index("fmi2DoStep")
+STEPS = (INTEGRATION, "fmi2DoStep", "fmi3DoStep")
 
-_Call = tuple[int, Callable[[], int]]  # number of an FMI function, and a call of it
+Call = tuple[int, Callable[[], int]]  # number of an FMI function, and a call of it
+
+
+class Equations(NamedTuple):
+    """What it takes to solve an FMU for model exchange. told_of_steps: it wants to know of every step of the solver."""
+
+    states: int
+    indicators: int
+    tolerance: float
+    told_of_steps: bool
 
 
 @dataclass(frozen=True)
 class Unpacked:
-    """An FMU on disk: its shared library, the folder it is unpacked in, its GUID and modelIdentifier."""
+    """An FMU on disk: its shared library, the folder it is unpacked in, its GUID and modelIdentifier.
+
+    version: 2 or 3, of FMI. equations: of an FMU for model exchange; None for one for co-simulation.
+    """
 
     library: Path
     folder: Path
     guid: str
     identifier: str
+    version: int = 2
+    equations: Equations | None = None
+
+
+class Variable(NamedTuple):
+    """What a slave needs to know of a variable. wire: its type in FMI 3.0. place, size: which element of an array."""
+
+    name: str
+    valueReference: int
+    wire: str = ""
+    place: int = 0
+    size: int = 1
+
+    @staticmethod
+    def of(variable: Any) -> Variable:
+        """Of a ModelVariable (fmpy), or one element of it."""
+        element = [getattr(variable, name) for name in ("wire", "place", "size") if hasattr(variable, name)]
+        return Variable(variable.name, variable.valueReference, *element)
 
 
 @dataclass(frozen=True)
@@ -99,10 +142,13 @@ class Inputs:
 
 
 class Slave:
-    """An FMU instance, from instantiation to ``close``. Every failure is a SimulationError.
+    """An instance of an FMU 2.0 for co-simulation, until ``close``. Every failure is a SimulationError.
 
     now: gets the number, in CALLS, of each call before it is made. say: called with what the FMU logs.
     """
+
+    _fmi = "fmi2"  # what the names of its functions begin with
+    _library: Any = FMU2Slave
 
     def __init__(self, name: str, fmu: Unpacked, now: Any = None, say: Callable[[str], None] | None = None) -> None:
         self.name = name
@@ -113,50 +159,64 @@ class Slave:
         try:
             _import_script(name, fmu.folder)
             self._now.value = CALLS.index("load of its binary")
-            self._fmu = _loaded(name, fmu)
+            self._fmu = _loaded(self._library, name, fmu)
         except SimulationError:
             self.messages.close()
             raise
-        self._now.value = CALLS.index("fmi2Instantiate")
+        self._now.value = CALLS.index(f"{self._fmi}Instantiate")
         try:
-            self._fmu.instantiate(callbacks=self.messages.callbacks, loggingOn=True)
+            self._instantiate()
         except Exception as error:  # fmpy raises plain exceptions
             said = self.messages.latest
             self.messages.close()
             self._fmu.freeLibrary()
             raise SimulationError(f"{name}: cannot be instantiated{quoted(said)}") from error
         self._instance: Any = self._fmu.component
-        self._do_step = self._function("fmi2DoStep")
         self._inputs = Inputs([], [])
-        self._gets: list[_Call] = []
-        self._initial_gets: list[_Call] = []
-        self._sets: list[_Call] = []
+        self._buffers: Sequence[np.ndarray] = ()
+        self._gets: list[Call] = []
+        self._initial_gets: list[Call] = []
+        self._sets: list[Call] = []
         self._reals: list[tuple[Outlet, np.ndarray]] = []
         self._warned = False
+        self._prepare_step(fmu)
+
+    def _instantiate(self) -> None:
+        """Raises what fmpy raises."""
+        self._fmu.instantiate(callbacks=self.messages.callbacks, loggingOn=True)
+
+    def _prepare_step(self, fmu: Unpacked) -> None:
+        self._do_step = self._function("fmi2DoStep")
 
     def connect(
         self, outlets: Sequence[Outlet], inlets: Sequence[Inlet], buffers: Sequence[np.ndarray] | None = None
     ) -> None:
         """Prepare the calls of ``read``, ``gather`` and ``write``. buffers: where the inputs are gathered, by inlet."""
         for outlet in outlets:
-            self._gets.append(self._call("Get", outlet.kind, outlet.variables, outlet.values))
+            self._gets += self._calls("Get", outlet.kind, outlet.variables, outlet.values)
             if outlet.outputs:
                 outputs = outlet.variables[: outlet.outputs]
-                self._initial_gets.append(self._call("Get", outlet.kind, outputs, outlet.values))
+                self._initial_gets += self._calls("Get", outlet.kind, outputs, outlet.values)
             if outlet.kind == "Real":
                 self._reals.append((outlet, np.zeros(len(outlet.variables))))
         if buffers is None:
             buffers = [np.zeros(len(inlet.variables), DTYPES[inlet.kind]) for inlet in inlets]
-        self._inputs = Inputs(inlets, buffers)
+        self._inputs, self._buffers = Inputs(inlets, buffers), buffers
         for inlet, buffer in zip(inlets, buffers, strict=True):
-            self._sets.append(self._call("Set", inlet.kind, inlet.variables, buffer))
+            self._sets += self._calls("Set", inlet.kind, inlet.variables, buffer)
 
-    def _call(self, verb: str, kind: str, variables: Sequence[Any], values: np.ndarray) -> _Call:
-        """An FMI function with all its arguments."""
+    def _calls(self, verb: str, kind: str, variables: Sequence[Any], values: np.ndarray) -> list[Call]:
+        """FMI functions with all their arguments that get or set values of a kind."""
         name = f"fmi2{verb}{kind}"
-        references, pointer = _references(variables), values.ctypes.data_as(_POINTERS[kind])
-        call = partial(self._function(name), self._instance, references, len(variables), pointer)
-        return CALLS.index(name), call
+        pointer = values.ctypes.data_as(_POINTERS[kind])
+        call = partial(
+            self._function(name),
+            self._instance,
+            references(v.valueReference for v in variables),
+            len(variables),
+            pointer,
+        )
+        return [(CALLS.index(name), call)]
 
     def _function(self, name: str) -> Callable[..., int]:
         """The C function, which gives its status back: FMPy's method takes longer than most FMUs do, and passes -5."""
@@ -171,20 +231,37 @@ class Slave:
         for setting in settings:
             variable, value = setting.variable, setting.value
             if isinstance(value, str):
-                name, text = "fmi2SetString", (c_char_p * 1)(value.encode())
-                call = partial(self._function(name), self._instance, _references([variable]), 1, text)
-                calls: list[_Call] = [(CALLS.index(name), call)]
+                calls = [self._set_text(variable, value)]
             else:
-                kind = _KINDS[type(value)]
-                calls = [self._call("Set", kind, [variable], np.array([value], DTYPES[kind]))]
+                kind = KINDS[type(value)]
+                calls = self._calls("Set", kind, [variable], self._array([setting], DTYPES[kind]))
             self._make(calls, f"{variable.name} = {value}")
+        self._enter(start_time)
+
+    def _array(self, settings: Sequence[Setting], dtype: Any) -> np.ndarray:
+        """Their values. Raises SimulationError for a whole number that is too large."""
+        try:
+            return np.array([setting.value for setting in settings], dtype)
+        except OverflowError:
+            told = ", ".join(f"{setting.variable.name} = {setting.value}" for setting in settings)
+            limits = np.iinfo(dtype)
+            raise SimulationError(f"{self.name}: {told}: beyond {limits.min} to {limits.max}") from None
+
+    def _set_text(self, variable: Any, text: str) -> Call:
+        name, value = "fmi2SetString", (c_char_p * 1)(text.encode())
+        return CALLS.index(name), partial(
+            self._function(name), self._instance, references([variable.valueReference]), 1, value
+        )
+
+    def _enter(self, start_time: float) -> None:
+        """Enter initialization mode."""
         at = when(start_time)
         self._plain("fmi2SetupExperiment", at, 0, 0.0, start_time, 0, 0.0)
         self._plain("fmi2EnterInitializationMode", at)
 
     def exit_initialisation(self, time: float) -> None:
         """Leave initialization mode: the instance can step from here on."""
-        self._plain("fmi2ExitInitializationMode", when(time))
+        self._plain(f"{self._fmi}ExitInitializationMode", when(time))
         self._may_terminate = True
 
     def gather(self) -> None:
@@ -198,14 +275,20 @@ class Slave:
     def advance(self, time: float, h: float, reached: float) -> None:
         """Hand over the gathered inputs, step from time to time + h, get the variables: those of time ``reached``."""
         self._make(self._sets, time)
-        self._now.value = DO_STEP
-        status = self._do_step(self._instance, time, h, fmi2True)
-        if status not in _GOOD:
-            raise self._failure("fmi2DoStep", status, when(time, h))
+        self._step(time, h)
+        self.read(reached)
+
+    def _step(self, time: float, h: float) -> None:
+        self._now.value = _DO_STEP
+        self._judge(self._do_step(self._instance, time, h, fmi2True), time, h)
+
+    def _judge(self, status: int, time: float, h: float) -> None:
+        """What a step has returned: an error is raised, the first warning kept."""
+        if status not in GOOD:
+            raise self._failure(f"{self._fmi}DoStep", status, when(time, h))
         if status == fmi2Warning and not self._warned:
             self._warned = True
-            self.messages.add(status, f"fmi2DoStep at {when(time)} returned a warning")
-        self.read(reached)
+            self.messages.add(status, f"{self._fmi}DoStep at {when(time)} returned a warning")
 
     def read(self, time: float) -> None:
         """Get the variables; none may be other than finite."""
@@ -222,12 +305,12 @@ class Slave:
         """Get the outputs during initialisation, where FMI allows no other variable."""
         self._make(self._initial_gets, time)
 
-    def _make(self, calls: Sequence[_Call], at: float | str) -> None:
+    def _make(self, calls: Sequence[Call], at: float | str) -> None:
         """Make calls; at: the time, or where else a failure happened."""
         for number, call in calls:
             self._now.value = number
             status = call()
-            if status not in _GOOD:
+            if status not in GOOD:
                 raise self._failure(CALLS[number], status, at if isinstance(at, str) else when(at))
 
     def _plain(self, name: str, at: str, *arguments: Any) -> None:
@@ -255,10 +338,10 @@ class Slave:
         self._closed = True
         if not self._lost:
             if self._may_terminate:
-                self._now.value = CALLS.index("fmi2Terminate")
-                self._function("fmi2Terminate")(self._instance)
-            self._now.value = CALLS.index("fmi2FreeInstance")
-            self._function("fmi2FreeInstance")(self._instance)
+                self._now.value = CALLS.index(f"{self._fmi}Terminate")
+                self._function(f"{self._fmi}Terminate")(self._instance)
+            self._now.value = CALLS.index(f"{self._fmi}FreeInstance")
+            self._function(f"{self._fmi}FreeInstance")(self._instance)
         self.messages.close()
 
     def _failure(self, name: str, status: int, at: str) -> SimulationError:
@@ -269,10 +352,11 @@ class Slave:
         return SimulationError(f"{self.name}: {error.args[0].rstrip('.')} at {at}{quoted(self.messages.latest)}")
 
 
-def _loaded(name: str, fmu: Unpacked) -> FMU2Slave:
+def _loaded(library: Any, name: str, fmu: Unpacked) -> Any:
+    """The functions of an FMU, by a class of fmpy."""
     folder_before = os.getcwd()
     try:
-        return FMU2Slave(
+        return library(
             guid=fmu.guid,
             modelIdentifier=fmu.identifier,
             unzipDirectory=str(fmu.folder),
@@ -312,5 +396,7 @@ def quoted(said: str) -> str:
     return f": {said}" if said else "; the FMU gave no reason"
 
 
-def _references(variables: Sequence[Any]) -> Any:
-    return (c_uint * len(variables))(*(variable.valueReference for variable in variables))
+def references(numbers: Iterable[int]) -> Any:
+    """Value references as a C array."""
+    numbers = list(numbers)
+    return (c_uint * len(numbers))(*numbers)

@@ -13,7 +13,7 @@ from ..files.archives import ArchiveError, unpack
 from ..files.locations import models_folder
 from ..files.names import no_such
 from ..files.scratch import new_scratch
-from ..fmi.archive import read_fmu
+from ..fmi.archive import interface_of, read_fmu
 from ..fmi.build import cached_fmu
 from ..fmi.native import cached_native_fmu
 from ..fmi.own import is_ours
@@ -167,6 +167,6 @@ def _instance_problems(parts: list[Part]) -> list[str]:
     problems = []
     for i, part in enumerate(parts):
         earlier = [other.name for other in parts[:i] if other.fmu == part.fmu]
-        if earlier and part.model.coSimulation.canBeInstantiatedOnlyOncePerProcess:
+        if earlier and interface_of(part.model).canBeInstantiatedOnlyOncePerProcess:
             problems.append(f"{part.name}: its FMU can be instantiated once, and {earlier[0]} uses it already")
     return problems

@@ -20,15 +20,9 @@ from typing import Any, NamedTuple, NoReturn
 import numpy as np
 
 from .errors import SimulationError
-from .slave import Inlet, Outlet, Slave, Unpacked
+from .kinds import slave_of
+from .slave import Equations, Inlet, Outlet, Slave, Unpacked, Variable
 from .wire import Numbers, Shared, Verb, receive_command, send_answer
-
-
-class Variable(NamedTuple):
-    """What a slave needs to know of a variable."""
-
-    name: str
-    valueReference: int
 
 
 class Start(NamedTuple):
@@ -92,8 +86,10 @@ class _Server:
         return ""
 
     def _instantiate(self, plan: Any) -> None:
-        fmu = Unpacked(Path(plan["library"]), Path(plan["folder"]), plan["guid"], plan["identifier"])
-        self._slave = Slave(plan["name"], fmu, self._shared.now, self._shared.say)
+        equations = Equations(*plan["equations"]) if plan["equations"] else None
+        paths = Path(plan["library"]), Path(plan["folder"])
+        fmu = Unpacked(*paths, plan["guid"], plan["identifier"], plan["version"], equations)
+        self._slave = slave_of(plan["name"], fmu, self._shared.now, self._shared.say)
         count = len(plan["inlets"])
         inputs, results = self._shared.buffers[:count], self._shared.buffers[count:]
         nothing = np.zeros(0)

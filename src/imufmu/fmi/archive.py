@@ -9,6 +9,7 @@ import fmpy
 from fmpy.model_description import ValidationError
 
 from ..files.archives import ArchiveError, listed, parse_xml, read_members, reason, unpack
+from .scalars import as_scalars
 
 
 def fmu_members(path: Path) -> tuple[set[str], Any]:
@@ -27,27 +28,43 @@ def fmu_members(path: Path) -> tuple[set[str], Any]:
 
 
 def read_fmu(path: Path) -> Any:
-    """Checked ModelDescription (fmpy) of an FMU that this machine can run.
+    """Checked ModelDescription (fmpy) of an FMU that this machine can run, its variables scalars as in FMI 2.0.
 
-    Raises ArchiveError unless it is FMI 2.0 for co-simulation with a binary for this platform.
+    Raises ArchiveError unless it is FMI 2.0 or 3.0, for co-simulation or model exchange, with a binary for this
+    platform.
+    """
+    names, model = read_model(path)
+    if interface_of(model) is None:
+        kind = "scheduled execution only" if model.scheduledExecution else "no kind of simulation"
+        raise ArchiveError(f"{path}: for {kind}; expected co-simulation or model exchange. Export it for one of these")
+    if not names & set(_library_names(model)):
+        raise ArchiveError(f"{path}: {_why_no_library(model, names)}")
+    if model.fmiMajorVersion == 3:
+        model.modelVariables = as_scalars(model.modelVariables)
+    return model
+
+
+def read_model(path: Path) -> tuple[set[str], Any]:
+    """Names of the members of an FMU 2.0 or 3.0 of any kind and platform, and its checked ModelDescription (fmpy).
+
+    Raises ArchiveError.
     """
     where = f"{path}: modelDescription.xml"
     names, root = fmu_members(path)
     version = root.get("fmiVersion")
-    if version != "2.0":
-        raise ArchiveError(f"{path}: FMI {version}; expected FMI 2.0 for co-simulation. Export it as that")
-    if root.find("CoSimulation") is None:
-        raise ArchiveError(f"{path}: for model exchange only; expected FMI 2.0 for co-simulation. Export it as that")
+    if version != "2.0" and not version.startswith("3.0"):
+        raise ArchiveError(f"{path}: FMI {version}; expected FMI 2.0 or 3.0. Export it as one of these")
     try:
-        description = fmpy.read_model_description(str(path))
+        return names, fmpy.read_model_description(str(path))
     except ValidationError as error:
         raise ArchiveError(f"{where}: {listed(error.problems)}") from error
     except Exception as error:  # fmpy raises plain exceptions, and its parsing any ValueError or KeyError
         raise ArchiveError(f"{where}: {reason(error)}") from error
-    identifier = description.coSimulation.modelIdentifier
-    if not any(candidate in names for candidate in _library_names(identifier)):
-        raise ArchiveError(f"{path}: {_why_no_library(identifier, names)}")
-    return description
+
+
+def interface_of(model: Any) -> Any:
+    """What is used of what a ModelDescription (fmpy) offers: co-simulation, or model exchange, or None of both."""
+    return model.coSimulation or model.modelExchange
 
 
 def open_fmu(path: Path, folder: Path) -> tuple[Path, Any]:
@@ -57,19 +74,33 @@ def open_fmu(path: Path, folder: Path) -> tuple[Path, Any]:
     """
     description = read_fmu(path)
     unpack(path, folder)
-    candidates = (folder / name for name in _library_names(description.coSimulation.modelIdentifier))
-    return next(library for library in candidates if library.is_file()), description
+    return next(library for name in _library_names(description) if (library := folder / name).is_file()), description
 
 
-def _library_names(identifier: str) -> list[str]:
+def kinds_of(model: Any) -> str:
+    """The kinds of simulation that a ModelDescription (fmpy) offers, for people."""
+    kinds = {
+        "co-simulation": model.coSimulation,
+        "model exchange": model.modelExchange,
+        "scheduled execution": model.scheduledExecution,
+    }
+    return " and ".join(name for name, part in kinds.items() if part) or "no kind of simulation"
+
+
+def _library_names(model: Any) -> list[str]:
     """Members that can hold the binary for this platform; the newer folder name tells the processor and goes first."""
-    folders = (fmpy.platform_tuple, fmpy.platform)
-    return [f"binaries/{folder}/{identifier}{fmpy.sharedLibraryExtension}" for folder in folders]
+    folders = (fmpy.platform_tuple, fmpy.platform) if model.fmiMajorVersion == 2 else (fmpy.platform_tuple,)
+    return [
+        f"binaries/{folder}/{interface_of(model).modelIdentifier}{fmpy.sharedLibraryExtension}" for folder in folders
+    ]
 
 
-def _why_no_library(identifier: str, names: set[str]) -> str:
+def _why_no_library(model: Any, names: set[str]) -> str:
+    identifier, folder = interface_of(model).modelIdentifier, fmpy.platform
+    if model.fmiMajorVersion == 3:
+        folder = fmpy.platform_tuple
     binaries = [PurePosixPath(name) for name in names if name.startswith("binaries/") and not name.endswith("/")]
-    here = sorted(b.name for b in binaries if b.parts[1] in (fmpy.platform, fmpy.platform_tuple))
+    here = sorted(b.name for b in binaries if b.parts[1] in (folder, fmpy.platform_tuple))
     if here:
         return (
             f"no binary belongs to modelIdentifier {identifier!r}: expected "
@@ -77,6 +108,6 @@ def _why_no_library(identifier: str, names: set[str]) -> str:
         )
     inside = sorted({b.parts[1] for b in binaries if len(b.parts) > 2})
     return (
-        f"no binary for this platform ({fmpy.platform}); it holds {', '.join(inside) or 'none'}. "
+        f"no binary for this platform ({folder}); it holds {', '.join(inside) or 'none'}. "
         "Build the FMU for this platform"
     )

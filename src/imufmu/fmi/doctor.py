@@ -15,7 +15,7 @@ import fmpy
 from fmpy.validation import validate_fmu
 
 from ..files.archives import ArchiveError, read_members
-from .archive import fmu_members
+from .archive import fmu_members, interface_of, kinds_of, read_fmu
 from .trial import SECONDS, try_step
 
 _SYSTEMS = {"linux": ".so", "darwin": ".dylib", "win": ".dll"}  # the name darwin has a win in it
@@ -31,7 +31,7 @@ _PLATFORMS = {
     "aarch64-linux": "Linux on ARM",
     "aarch64-darwin": "macOS on Apple silicon",
 }
-# Hosts, and where they run. Only FMPy is known to look into the folders of processors that came with FMI 2.0.4.
+# Hosts, and where they run. With FMI 2.0 only FMPy is known to look into the folders named as those of FMI 3.0 are.
 _DESKTOPS = frozenset({"linux64", "win64", "darwin64"})
 _HOSTS = {
     "Simulink": _DESKTOPS,
@@ -39,6 +39,12 @@ _HOSTS = {
     "OpenModelica": _DESKTOPS,
     "OMSimulator": _DESKTOPS,
     "FMPy": frozenset(_PLATFORMS),
+}
+_FMI_3 = {
+    "x86_64-linux": "linux64",
+    "x86_64-windows": "win64",
+    "x86_64-darwin": "darwin64",
+    "aarch64-darwin": "darwin64",
 }
 # PythonFMU decodes no other character of the address that a host gives it, and crashes the host where that fails.
 _PLAIN_PATH = "unpack it to a path of ASCII letters, digits, blanks and -._~ only: others crash the host"
@@ -79,16 +85,13 @@ def examine(path: Path, step_timeout: float = SECONDS) -> list[Finding]:
     if is_python:
         findings.append(_python_packages(path))
     complete = [platform for platform in platforms if not _missing_library(platform, names, model)]
-    findings += _hosts(complete, model, is_python)
+    findings += [_here(path), *_hosts(complete, model, is_python)]
     findings.append(_trial(path, platforms, model, step_timeout))
     return findings
 
 
 def _standard(path: Path, model: Any) -> Iterator[Finding]:
-    kinds = [
-        name for name, part in (("co-simulation", model.coSimulation), ("model exchange", model.modelExchange)) if part
-    ]
-    yield Finding(Level.GOOD, "kind", f"FMI {model.fmiVersion}, {' and '.join(kinds) or 'of no kind that FMPy knows'}")
+    yield Finding(Level.GOOD, "kind", f"FMI {model.fmiVersion}, {kinds_of(model)}")
     problems = validate_fmu(str(path))
     if not problems:
         yield Finding(Level.GOOD, "validation", "FMPy finds nothing to complain about")
@@ -104,7 +107,8 @@ def _bounds(model: Any) -> Iterator[Finding]:
         low, high = (getattr(v, a) or (getattr(declared, a) if declared else None) for a in ("min", "max"))
         try:
             least, most = float(low or "-inf"), float(high or "inf")
-            start = None if v.start is None or v.type not in ("Real", "Integer") else float(v.start)
+            number = v.type.rstrip("0123456789") in ("Real", "Float", "Integer", "Int", "UInt") and not v.shape
+            start = float(v.start) if number and v.start is not None else None
         except ValueError as error:
             faults.append(f"{v.name}: {error}")
             continue
@@ -135,7 +139,8 @@ def _binaries(names: Collection[str], platforms: list[str], model: Any) -> Itera
 def _missing_library(platform: str, names: Container[str], model: Any) -> str:
     """A library that should be in the platform's folder and is not; empty if all are, or if its suffix is unknown."""
     suffix = next((s for system, s in _SYSTEMS.items() if system in platform), "")
-    wanted = [f"{part.modelIdentifier}{suffix}" for part in (model.coSimulation, model.modelExchange) if part]
+    parts = (model.coSimulation, model.modelExchange, model.scheduledExecution)
+    wanted = [f"{part.modelIdentifier}{suffix}" for part in parts if part]
     return next((file for file in wanted if suffix and f"binaries/{platform}/{file}" not in names), "")
 
 
@@ -166,15 +171,30 @@ def _python_packages(path: Path) -> Finding:
     return Finding(Level.NOTE, "Python", f"{text} (all installed here); {_PLAIN_PATH}")
 
 
+def _here(path: Path) -> Finding:
+    """Whether imufmu runs it, as a plant or anything else in a system."""
+    try:
+        model = read_fmu(path)
+    except ArchiveError as error:
+        return Finding(Level.NOTE, "imufmu", f"does not run it: {str(error).removeprefix(f'{path}: ')}")
+    solver = "" if model.coSimulation else ", its equations solved by CVode of FMPy"
+    return Finding(Level.GOOD, "imufmu", f"runs it as a component of a system on this machine{solver}")
+
+
 def _hosts(platforms: list[str], model: Any, is_python: bool) -> Iterator[Finding]:
+    if interface_of(model) is None:
+        yield Finding(Level.NOTE, "hosts", f"for {kinds_of(model)}, which none of {', '.join(_HOSTS)} is known to run")
+        return
+    is_fmi_2 = str(model.fmiVersion).startswith("2.")
     for host, its_platforms in _HOSTS.items():
-        where = ", ".join(_PLATFORMS[platform] for platform in platforms if platform in its_platforms)
+        known = its_platforms | (set() if is_fmi_2 else {new for new, old in _FMI_3.items() if old in its_platforms})
+        where = ", ".join(_PLATFORMS[platform] for platform in platforms if platform in known)
         if not where:
             yield Finding(Level.NOTE, host, "nowhere: no binary for a platform that it runs on")
             continue
         needs = []
-        if host in ("OpenModelica", "OMSimulator") and not str(model.fmiVersion).startswith("2."):
-            needs.append("an FMU of version 2.0")
+        if not is_fmi_2 and host != "FMPy":
+            needs.append("an FMU 2.0" if host == "OpenModelica" else "a release that reads FMI 3.0")
         if host == "OpenModelica" and model.modelExchange is None:
             needs.append("OMSimulator, its part for co-simulation")
         if is_python and host != "FMPy":
@@ -184,8 +204,8 @@ def _hosts(platforms: list[str], model: Any, is_python: bool) -> Iterator[Findin
 
 
 def _trial(path: Path, platforms: list[str], model: Any, seconds: float) -> Finding:
-    if model.coSimulation is None and model.modelExchange is None:
-        return Finding(Level.NOTE, "one step", "not tried: of no kind that FMPy runs")
+    if interface_of(model) is None:
+        return Finding(Level.NOTE, "one step", f"not tried: FMPy does not run FMUs for {kinds_of(model)}")
     if not {fmpy.platform, fmpy.platform_tuple} & set(platforms):
         return Finding(Level.PROBLEM, "one step", f"not tried: no binary for this machine ({fmpy.platform})")
     trial = try_step(path, seconds)
