@@ -134,11 +134,9 @@ def broken(line: int, text: str) -> str:
         ("\n".join(lines_of()[1:]), "line 1: no names"),
         (HEADER, "0 samples"),
         ("\n".join(lines_of(1)), "1 samples"),
-        ("\n".join(lines_of()).replace(",", ";"), "line 1: separate the columns by commas"),
         (broken(1, HEADER.replace("gyro[2]", "gyr_y")), r"line 1: missing: gyro\[2\] \(rad/s\).*'gyr_y'"),
         (broken(1, HEADER.replace("gyro[2]", "gyro[1]")), r"column 'gyro\[1\]' appears 2 times"),
-        (broken(1, HEADER.replace("gyro[1]", "gyro[1] [deg/s]")), r"just 'gyro\[1\]', in SI units \(rad/s\)"),
-        (broken(1, HEADER.replace("accel[1]", "accel[1] (g)")), r"just 'accel\[1\]', in SI units \(m/s2\)"),
+        (broken(1, HEADER.replace("gyro[1]", "gyro[1] [furlong]")), r"unit 'furlong' of column 'gyro\[1\]' is unknown"),
         (broken(1, HEADER.replace("gyro[1]", "mag[1]")), r"missing: gyro\[1\].*mag\[2\] \(uT\)"),
         (broken(4, "0.02,0,abc,0,0,0,9.8"), r"line 4, column 'gyro\[2\]': 'abc' is not a number"),
         (broken(4, "0.02,0,0,0,0,9.8"), "line 4: 6 fields, but the header names 7"),
@@ -150,9 +148,8 @@ def broken(line: int, text: str) -> str:
         (broken(4, "0.0101,0,0,0,0,0,9.8"), "line 4, column 'time': 0.0101 s is less than half a sample period"),
         (broken(6, "1e300,0,0,0,0,0,9.8"), "line 6, column 'time': missing or not in seconds"),
         (broken(6, "1e9,0,0,0,0,0,9.8"), r"line 6, column 'time': a gap of 1e\+09 s"),
-        (HEADER + "\n0,0,0,0,0,0,9.8\n1e4,0,0,0,0,0,9.8", "line 3, column 'time': samples are 10000 s apart"),
-        (b"\x89PNG\r\n\x1a\n\x00\xff\xfe", "not a UTF-8 text file"),
-        ("\n".join(lines_of()).encode("utf-16"), "not a UTF-8 text file"),
+        (HEADER + "\n0,0,0,0,0,0,9.8\n1e11,0,0,0,0,0,9.8", r"line 3, column 'time': samples are 1e\+11 s apart"),
+        (b"\x89PNG\r\n\x1a\n\x00\xff\xfe", "not a text file"),
         (HEADER + "," + "x" * 200_000, "not a CSV table"),
     ],
 )
@@ -181,7 +178,9 @@ def test_a_quaternion_that_is_no_rotation_is_refused(tmp_path: Path) -> None:
         read(csv_of(tmp_path, still() | {"q_NS": q_NS}))
 
 
-@pytest.mark.parametrize("name", ["missing.csv", "missing.mat", "folder.csv", "folder.mat", "record.txt", "record"])
+@pytest.mark.parametrize(
+    "name", ["missing.csv", "missing.mat", "missing.zip", "folder.csv", "folder.mat", "record.doc", "record"]
+)
 def test_what_is_no_recording_is_refused_by_name(tmp_path: Path, name: str) -> None:
     if name.startswith("folder"):
         (tmp_path / name).mkdir()

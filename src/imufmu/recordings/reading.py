@@ -1,6 +1,6 @@
-"""Real recordings: CSV, and trials of BROAD [1].
+"""Real recordings of any kind: the one door through which all of them come.
 
-A CSV recording has one header line and then one row per sample, in SI units, in any order of columns:
+Of our own kind is a CSV table with one header line and one row per sample, in SI units, columns in any order:
 
     column                        unit      meaning
     time                          s         increasing; gaps and jitter of the clock are allowed
@@ -8,44 +8,41 @@ A CSV recording has one header line and then one row per sample, in SI units, in
     accel[1] .. accel[3]          m/s2      accelerometer (specific force: +g on the axis that points up at rest), S
     mag[1] .. mag[3]              uT        magnetometer, S; optional
     forward_speed                 m/s       speed along the vehicle's x axis as its wheels tell it; optional
+    forward_speed_valid           1         0 where forward_speed is to be left out; optional
     roll, pitch, yaw              rad       true Z-Y-X Euler angles; each optional
     q_NS[1] .. q_NS[4]            1         true attitude, Hamilton, scalar first, S to N (Z up); optional
 
-An empty cell or ``nan`` is a missing reading. Other columns are ignored, with a note.
-
-[1] Laidig, Caruso, Cereatti, Seel, BROAD - A Benchmark for Robust Inertial Orientation Estimation, Data 6(7), 2021,
-    doi:10.3390/data6070072
+An empty cell or ``nan`` is a missing reading. Other columns are ignored, with a note. Other names, units and
+separators: ``columns``, ``text_table``, ``presets``; other axes: ``axes``; times of other kinds: ``stamps``.
 """
 
 from __future__ import annotations
 
-import csv
 import os
-import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
-from functools import partial
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from ..blocks import vocabulary as v
-from ..blocks.rotations import angle_between, euler_from_quaternion, over_rows, vertical_from_roll_pitch
-from .matlab import MatlabError, read_matlab
-from .sample_clock import ClockError, sample_clock
+from ..blocks.rotations import euler_from_quaternion, over_rows, vertical_from_roll_pitch
+from .axes import Axes, parsed_axes
+from .broad import read_broad
+from .columns import parsed_columns
+from .doubts import doubts
+from .faults import RecordingError
+from .folders import read_folder
+from .raw import Raw, Where
+from .text_reading import read_text
+from .told import Told, recall
 
-_REQUIRED = (v.GYRO, v.ACCEL)
-_OPTIONAL = (v.MAG, v.FORWARD_SPEED, v.Q_NS, v.ROLL, v.PITCH, v.YAW)
-_TRUTH = (v.Q_NS, v.ROLL, v.PITCH, v.YAW)
-_UNITS = {"time": "s"} | {name: signal.unit for signal in (*_REQUIRED, *_OPTIONAL) for name in signal.element_names()}
+TEXTS = (".csv", ".txt", ".tsv", ".dat", ".log")
+_READINGS = (v.GYRO.name, v.ACCEL.name, v.MAG.name, v.FORWARD_SPEED.name)
+_TRUTH = (v.Q_NS.name, v.ROLL.name, v.PITCH.name, v.YAW.name)
 _PERIOD_BOUNDS = v.sample_period(0.01)
 
-Where = Callable[[int], str]  # row -> what a user calls it
-
-
-class RecordingError(ValueError):
-    """A recording cannot be used; the message names file, place, fault and what to do."""
+__all__ = ["Recording", "RecordingError", "hold_missing", "read"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,7 +53,8 @@ class Recording:
     missing. truth: q_NS (n, 4), vertical (n, 3), roll, pitch, yaw (n,), rad, as far as the file tells; NaN where
     unknown. scored: (n,), bool, samples that count for errors. Row i belongs to the instant
     time[0] + sample_index[i] * sample_period; instants that no row belongs to are missing samples. notes: what a user
-    should know but that is no error. forward_speed: (n,), m/s; as mag, None where the file has none.
+    should know but that is no error. forward_speed: (n,), m/s; as mag, None where the file has none. axes: those of
+    the file, in which estimates are given back. facts, names: about the file, and its columns by signal.
     """
 
     path: Path
@@ -70,6 +68,9 @@ class Recording:
     sample_index: np.ndarray
     notes: tuple[str, ...] = ()
     forward_speed: np.ndarray | None = None
+    axes: Axes = field(default_factory=Axes)
+    facts: Mapping[str, str] = field(default_factory=dict)
+    names: Mapping[str, Sequence[str]] = field(default_factory=dict)
 
     def __repr__(self) -> str:
         known = ", ".join([*self.readings, *self.truth])
@@ -114,184 +115,79 @@ def hold_missing(readings: np.ndarray) -> np.ndarray:
     return np.where(last >= 0, held, 0.0)
 
 
-def read(path: str | os.PathLike[str], rate: float | None = None) -> Recording:
-    """Read a recording: ``.csv`` (see above) or ``.mat`` (a trial of BROAD).
+def read(
+    path: str | os.PathLike[str],
+    rate: float | None = None,
+    *,
+    columns: Iterable[str] | Mapping[str, str] = (),
+    axes: str | None = None,
+    mount: str | None = None,
+    stream: str | None = None,
+) -> Recording:
+    """Read a recording of any kind that is known: a text table, a folder or .zip of them, a log, a trial of BROAD.
 
-    rate: Hz, of a .csv whose rows are evenly spaced but whose times are of no use, as those of a host that gets samples
-    in bunches; they are ignored then. Raises RecordingError.
+    rate: Hz, of rows that are evenly spaced but whose times are of no use; they are ignored then. columns: which
+    columns of a table are what, ``["gyro=wx,wy,wz:deg/s", "time=t:ms"]`` or ``{"gyro": "wx,wy,wz:deg/s"}``. axes: the
+    convention of the file, such as ``NED``. mount: how the sensor sits on the body, ``roll,pitch,yaw`` in degrees or
+    its axes, ``x,-y,-z``. stream: which of several sensors of a log. What is not given here is taken from the file
+    ``NAME.toml`` beside the recording NAME, where there is one (``remember``). Raises RecordingError.
     """
     path = Path(path)
-    readers: dict[str, Callable[[Path], Recording]] = {".csv": partial(_read_csv, rate=rate), ".mat": _read_broad}
-    reader = readers.get(path.suffix.lower())
-    if reader is None:
-        raise RecordingError(
-            f"{path}: cannot read {path.suffix or 'a file without suffix'}; use .csv, or .mat for BROAD"
-        )
-    if rate is not None and not _PERIOD_BOUNDS.minimum <= 1 / (rate or np.nan) <= _PERIOD_BOUNDS.maximum:
-        raise RecordingError(f"{path}: a rate of {rate:g} Hz cannot be; give samples per second")
+    told = Told(parsed_columns(columns), rate, axes, mount, stream)
+    remembered = recall(path)
+    told, notes = told.completed(remembered, path)
+    if told.rate is not None and not _PERIOD_BOUNDS.minimum <= 1 / (told.rate or np.nan) <= _PERIOD_BOUNDS.maximum:
+        raise RecordingError(f"{path}: a rate of {told.rate:g} Hz cannot be; give samples per second")
+    turned = parsed_axes(told.axes, told.mount)
     try:
-        return reader(path)
+        raw = _reader(path)(path, told)
     except OSError as error:
         raise RecordingError(f"{path}: cannot read: {error.strerror or error}") from None
     except MemoryError:
         raise RecordingError(f"{path}: too large for this machine's memory; split it") from None
+    return _recording(path, raw, turned, [*notes, *raw.notes])
 
 
-def _read_csv(path: Path, rate: float | None) -> Recording:
-    """Read the CSV format of the module docstring."""
-    lines: list[int] = []
-    try:
-        with open(path, newline="", encoding="utf-8-sig") as file:
-            reader = csv.reader(file)
-            header = [name.strip() for name in next(reader, [])]
-            places, notes = _places(path, header, rate is None)
-            rows = _numbers(path, reader, header, places, lines)
-    except UnicodeDecodeError:
-        raise RecordingError(f"{path}: not a UTF-8 text file; save the table as CSV in UTF-8") from None
-    except csv.Error as error:
-        raise RecordingError(f"{path}, after line {reader.line_num}: not a CSV table: {error}") from None
-    if len(rows) < 2:
-        raise RecordingError(f"{path}: {len(rows)} samples; a recording needs at least 2")
-    table = dict(zip(places, np.array(rows).T, strict=True))
-    signals = {
-        signal.name: np.column_stack([table[name] for name in signal.element_names()]).reshape(-1, *signal.shape)
-        for signal in (*_REQUIRED, *_OPTIONAL)
-        if signal.element_names()[0] in table
-    }
-
-    def where(row: int) -> str:
-        return f"{path}, line {lines[row]}"
-
-    if rate is None:
-        time = table["time"]
-        try:
-            period, index = sample_clock(time)
-        except ClockError as error:
-            hint = "; or give the rate (--rate), if the rows are evenly spaced" if len(time) > 2 else ""
-            raise RecordingError(f"{where(error.row)}, column 'time': {error}{hint}") from None
-    else:
-        period, index = 1 / rate, np.arange(len(rows))
-        time = index / rate
-        notes.append(f"rows are taken for evenly spaced at {rate:g} Hz; times of the file are not used")
-    missing = int(index[-1]) + 1 - len(time)
-    if missing:
-        longest = int(np.argmax(np.diff(time)))
-        notes.append(
-            f"{missing} of {index[-1] + 1} samples have no row; the longest gap is after line {lines[longest]}"
-        )
-    return _recording(path, time, period, index, signals, np.ones(len(time), bool), notes, where)
+def _reader(path: Path) -> Callable[[Path, Told], Raw]:
+    """What reads a file of this kind. Raises RecordingError."""
+    suffix = path.suffix.lower()
+    if path.is_dir() or suffix == ".zip":
+        return lambda path, told: read_folder(path, told.rate, told.columns)
+    if suffix in TEXTS:
+        return lambda path, told: read_text(path, told.rate, told.columns)
+    if suffix == ".mat":
+        return lambda path, told: read_broad(path)
+    kinds = ", ".join((*TEXTS, ".zip"))
+    raise RecordingError(f"{path}: cannot read {suffix or 'a file without suffix'}; use {kinds}, or .mat for BROAD")
 
 
-def _places(path: Path, header: Sequence[str], timed: bool) -> tuple[dict[str, int], list[str]]:
-    """Place of every known column, and notes. Raises RecordingError with every problem of the header."""
-    if not re.search("[a-df-z]", "".join(header), re.IGNORECASE):  # at most the e of 1e-3
-        raise RecordingError(f"{path}, line 1: no names; the first line must name the columns: time, gyro[1], ...")
-    if len(header) == 1 and re.search(r"[;\t|]", header[0]):
-        raise RecordingError(f"{path}, line 1: separate the columns by commas, and write numbers with a decimal point")
-    places = {name: place for place, name in enumerate(header) if name in _UNITS}
-    problems = [f"column {name!r} appears {header.count(name)} times" for name in places if header.count(name) > 1]
-    decorated = r"({})\s*[\[({{/].*".format("|".join(map(re.escape, _UNITS)))
-    for name in header:
-        if name not in _UNITS and (match := re.fullmatch(decorated, name)):
-            known = match[1]
-            problems.append(f"name column {name!r} just {known!r}, in SI units ({_UNITS[known]})")
-    if not problems:
-        needed = ["time"] * timed + [name for signal in _REQUIRED for name in signal.element_names()]
-        for signal in _OPTIONAL:
-            needed += signal.element_names() if places.keys() & set(signal.element_names()) else []
-        missing = [name for name in needed if name not in places]
-        if missing:
-            wanted = ", ".join(f"{name} ({_UNITS[name]})" for name in missing)
-            problems.append(f"missing: {wanted}; the columns are {_listed(header)}: rename them and use SI units")
-    if problems:
-        raise RecordingError(f"{path}, line 1: " + "; ".join(problems))
-    ignored = [name for name in header if name not in _UNITS]
-    return places, [f"ignored columns: {_listed(ignored)}"] if ignored else []
-
-
-def _listed(names: Sequence[str]) -> str:
-    """Names for a message, shortened: a file of another kind may have any."""
-    shown = [repr(name if len(name) <= 30 else name[:30] + "...") for name in names[:20]]
-    return ", ".join(shown) + (f" and {len(names) - 20} more" if len(names) > 20 else "")
-
-
-def _numbers(
-    path: Path, reader: Any, header: Sequence[str], places: Mapping[str, int], lines: list[int]
-) -> list[list[float]]:
-    """Values of the known columns; ``lines`` receives the line of each row, counted from 1."""
-    rows = []
-    order = list(places.values())
-    line = reader.line_num + 1
-    for cells in reader:
-        if len(cells) == len(header):
-            try:
-                rows.append([float(cells[place]) for place in order])
-            except ValueError:
-                rows.append([_number(cells[p], f"{path}, line {line}, column {header[p]!r}") for p in order])
-            lines.append(line)
-        elif "".join(cells).strip():
-            raise RecordingError(f"{path}, line {line}: {len(cells)} fields, but the header names {len(header)}")
-        line = reader.line_num + 1
-    return rows
-
-
-def _number(cell: str, where: str) -> float:
-    try:
-        return float(cell) if cell.strip() else np.nan
-    except ValueError:
-        raise RecordingError(f"{where}: {_listed([cell])} is not a number") from None
-
-
-def _read_broad(path: Path) -> Recording:
-    """Read a trial of BROAD: a MATLAB file with imu_gyr, imu_acc, imu_mag, opt_quat, movement, sampling_rate."""
-    try:
-        content = read_matlab(path)
-    except MatlabError as error:
-        raise RecordingError(f"{path}: {error}") from None
-
-    def array(key: str, width: int, rows: int | None = None) -> np.ndarray:
-        if key not in content:
-            found = _listed(list(content)) or "none"
-            raise RecordingError(f"{path}: no variable {key!r}, so not a trial of BROAD; the variables are {found}")
-        value = content[key]
-        if value is None or value.ndim != 2 or value.shape[1] != width or rows not in (None, len(value)):
-            shape = "no matrix of real numbers" if value is None else f"of shape {value.shape}"
-            raise RecordingError(f"{path}: {key!r} is {shape}, expected ({'n' if rows is None else rows}, {width})")
-        return value
-
-    rate = array("sampling_rate", 1, 1).item()
-    if not _PERIOD_BOUNDS.minimum <= 1 / (rate or np.nan) <= _PERIOD_BOUNDS.maximum:
-        raise RecordingError(f"{path}: 'sampling_rate' is {rate:g}, expected a rate in Hz")
-    gyro = array("imu_gyr", 3)
-    n = len(gyro)
-    if n < 2:
-        raise RecordingError(f"{path}: {n} samples; a recording needs at least 2")
-    signals = {"gyro": gyro, "accel": array("imu_acc", 3, n), "mag": array("imu_mag", 3, n)}
-    signals["q_NS"] = array("opt_quat", 4, n)
-    scored = array("movement", 1, n).ravel() != 0
-    index = np.arange(n)
-    return _recording(path, index / rate, 1 / rate, index, signals, scored, [], lambda row: f"{path}, row {row + 1}")
-
-
-def _recording(
-    path: Path,
-    time: np.ndarray,
-    period: float,
-    index: np.ndarray,
-    signals: Mapping[str, np.ndarray],
-    scored: np.ndarray,
-    notes: Iterable[str],
-    where: Where,
-) -> Recording:
-    """The recording of checked signals: truth completed, samples without truth not scored, doubts noted."""
-    gyro, accel, mag = signals["gyro"], signals["accel"], signals.get("mag")
+def _recording(path: Path, raw: Raw, axes: Axes, notes: Sequence[str]) -> Recording:
+    """The recording of checked signals in our axes: truth completed, doubts noted."""
+    clock = raw.clock
     with np.errstate(over="ignore", invalid="ignore"):  # absurd values are for the notes
-        truth = _complete({s.name: signals[s.name] for s in _TRUTH if s.name in signals}, where)
+        signals = axes.to_ours(raw.signals)
+        truth = _complete({name: signals[name] for name in _TRUTH if name in signals}, raw.where)
+        scored = np.ones(len(clock.time), bool) if raw.scored is None else raw.scored
         for values in truth.values():
-            scored = scored & np.isfinite(values.reshape(len(time), -1)).all(axis=1)
-        speed = signals.get("forward_speed")
-        recording = Recording(path, time, gyro, accel, mag, truth, scored, period, index, forward_speed=speed)
-        return replace(recording, notes=(*notes, *_doubts(recording)))
+            scored = scored & np.isfinite(values.reshape(len(clock.time), -1)).all(axis=1)
+        readings = {name: signals[name] for name in _READINGS if name in signals}
+        doubtful = doubts(readings, truth, scored, clock.period)
+    return Recording(
+        path,
+        clock.time,
+        signals["gyro"],
+        signals["accel"],
+        signals.get("mag"),
+        truth,
+        scored,
+        clock.period,
+        clock.index,
+        tuple(note for note in (*notes, axes.note(), *doubtful) if note),
+        signals.get("forward_speed"),
+        axes,
+        raw.facts or {},
+        raw.names or {},
+    )
 
 
 def _complete(truth: Mapping[str, np.ndarray], where: Where) -> dict[str, np.ndarray]:
@@ -308,41 +204,3 @@ def _complete(truth: Mapping[str, np.ndarray], where: Where) -> dict[str, np.nda
     if {"roll", "pitch"} <= full.keys():
         full["vertical"] = over_rows(vertical_from_roll_pitch, full["roll"], full["pitch"])
     return full
-
-
-def _doubts(recording: Recording) -> list[str]:
-    """Notes on values that can be right but look like a wrong unit, axis or convention."""
-    vectors = {name: array for name, array in recording.readings.items() if array.ndim > 1}
-    usual = {name: _typical_length(array) for name, array in vectors.items()}
-    doubts = [f"{name} has no complete sample" for name, length in usual.items() if np.isnan(length)]
-    if usual["accel"] < 5 or usual["accel"] > 20:
-        hint = "; are the values in g?" if 0.5 < usual["accel"] < 2 else ""
-        doubts.append(f"accel has a median length of {usual['accel']:.3g} m/s2, far from gravity{hint}")
-    fast = _typical_length(recording.gyro, 0.99)
-    if fast > 20:
-        doubts.append(f"gyro exceeds {fast:.3g} rad/s in 1 % of the samples; are the values in deg/s?")
-    if "mag" in usual and (usual["mag"] < 10 or usual["mag"] > 150):
-        doubts.append(f"mag has a median length of {usual['mag']:.3g} uT; the Earth's field has 22 to 67 uT")
-    if recording.sample_period > 0.5:
-        doubts.append(f"samples are {recording.sample_period:g} s apart; are the times in milliseconds?")
-    if not recording.scored.any():
-        doubts.append("no sample counts for errors: truth is missing everywhere")
-    if "vertical" in recording.truth:
-        off_vertical = over_rows(angle_between, recording.accel, recording.truth["vertical"])[:, 0]
-        off = np.rad2deg(_quantile(off_vertical, 0.5))
-        if off > 30:
-            doubts.append(
-                f"accel is {off:.0f} deg off the true vertical in half of the samples; is the truth in rad, scalar "
-                "first, S to N, Z up, and does accel read +g on the axis that points up?"
-            )
-    return doubts
-
-
-def _typical_length(vectors: np.ndarray, quantile: float = 0.5) -> float:
-    return _quantile(np.linalg.norm(vectors, axis=1), quantile)
-
-
-def _quantile(values: np.ndarray, quantile: float) -> float:
-    """Quantile of the finite values; NaN if there are none."""
-    finite = values[np.isfinite(values)]
-    return float(np.quantile(finite, quantile)) if finite.size else np.nan

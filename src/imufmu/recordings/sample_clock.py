@@ -59,10 +59,10 @@ def sample_clock(time: np.ndarray) -> tuple[float, np.ndarray]:
     period = float(np.mean(intervals[regular]) / shortest)
     pieces = 1 + np.count_nonzero(~regular)  # each begins and ends with a stamp, rounded by half a spacing
     rounding = pieces * np.spacing(np.abs(time).max()) / (np.count_nonzero(regular) * shortest)
-    return _plainest(period, float(rounding)), index
+    return plainest(period, float(rounding)), index
 
 
-def _plainest(period: float, rounding: float) -> float:
+def plainest(period: float, rounding: float) -> float:
     """The period, or rate, of the fewest digits that the rounding of the stamps allows; of twelve at most.
 
     0.01, not 0.010000000000000002; nor 0.0099999987 where the stamps count from 1970.
