@@ -33,6 +33,7 @@ from .columns import parsed_columns
 from .doubts import doubts
 from .faults import RecordingError
 from .folders import read_folder
+from .logs.reading import LOGS, is_log, read_log
 from .raw import Raw, Where
 from .text_reading import read_text
 from .told import Told, recall
@@ -151,13 +152,15 @@ def read(
 def _reader(path: Path) -> Callable[[Path, Told], Raw]:
     """What reads a file of this kind. Raises RecordingError."""
     suffix = path.suffix.lower()
+    if is_log(path):
+        return read_log
     if path.is_dir() or suffix == ".zip":
         return lambda path, told: read_folder(path, told.rate, told.columns)
     if suffix in TEXTS:
         return lambda path, told: read_text(path, told.rate, told.columns)
     if suffix == ".mat":
         return lambda path, told: read_broad(path)
-    kinds = ", ".join((*TEXTS, ".zip"))
+    kinds = ", ".join((*TEXTS, ".zip", *LOGS))
     raise RecordingError(f"{path}: cannot read {suffix or 'a file without suffix'}; use {kinds}, or .mat for BROAD")
 
 
