@@ -168,5 +168,6 @@ def test_what_cannot_run_is_refused_in_one_sentence(
 
 def test_co_simulation_is_taken_where_an_fmu_offers_both(tmp_path: Path) -> None:
     """Its solver is exact, and it ends the run beyond the limit, where the equations bounce."""
-    with pytest.raises(SimulationError, match=r"^plant: fmi3DoStep asks to end the run at t = 0 s, step 0\.01 s"):
-        rocked("3_cs", tmp_path, limit=0.1)
+    result = rocked("3_cs", tmp_path, limit=0.1)
+    assert len(result.time) == 1 and not result.partial
+    assert any(note.startswith("plant ended the run at t = 0 s, step 0.01 s") for note in result.notes)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import re
 import stat
+import warnings
 import zipfile
 from pathlib import Path
 
@@ -13,6 +15,7 @@ from imufmu.cosim.description import read_description
 from imufmu.files import archives
 from imufmu.files.archives import LARGEST_READ, ArchiveError, check_xml, parse_xml, unpack
 from imufmu.fmi.archive import open_fmu, read_fmu
+from imufmu.fmi.doctor import Level, examine
 from support.cosim_stubs import LIBRARY, fake_fmu, model_description, stub, variable, write_zip
 
 
@@ -220,11 +223,9 @@ XML = model_description([variable("y", "output")])
 UNFIT = {
     "no model description": ({LIBRARY: b""}, "modelDescription.xml is missing"),
     "other root": ({"modelDescription.xml": "<a/>", LIBRARY: b""}, "no FMI model description: the root element is a"),
-    "FMI 3": ({"modelDescription.xml": XML.replace('"2.0"', '"3.0"'), LIBRARY: b""}, r"FMI 3\.0; expected FMI 2\.0"),
-    "FMI 1": ({"modelDescription.xml": XML.replace('"2.0"', '"1.0"'), LIBRARY: b""}, r"FMI 1\.0; expected FMI 2\.0"),
-    "model exchange": (
-        {"modelDescription.xml": XML.replace("<CoSimulation", "<ModelExchange"), LIBRARY: b""},
-        "for model exchange only",
+    "FMI 4": (
+        {"modelDescription.xml": XML.replace('fmiVersion="2.0"', 'fmiVersion="4.0"'), LIBRARY: b""},
+        r"FMI 4\.0; expected FMI 2\.0 or 3\.0",
     ),
     "schema": (
         {"modelDescription.xml": XML.replace('causality="output"', 'causality="sideways"'), LIBRARY: b""},
@@ -262,3 +263,56 @@ def test_an_fmu_that_cannot_run_here_is_refused_with_the_reason(
     with pytest.raises(ArchiveError, match=reason) as caught:
         read_fmu(path)
     assert str(path) in str(caught.value)
+
+
+@pytest.mark.parametrize(("prefix", "folders", "told"), [
+    ("./", (), "begins with ./"),
+    ("", ("documentation/", "documentation/"), "'documentation/' occurs twice"),
+    ("", ("documentation/Modelica::Blocks.html",), "has a colon in its name"),
+])  # fmt: skip
+def test_odd_names_of_members_are_read_and_told(
+    tmp_path: Path, prefix: str, folders: tuple[str, ...], told: str
+) -> None:
+    path = tmp_path / "a.fmu"
+    with warnings.catch_warnings(), zipfile.ZipFile(path, "w") as archive:
+        warnings.simplefilter("ignore")  # of zipfile, which does not like names to occur twice either
+        for name, content in {"modelDescription.xml": XML, LIBRARY: b"library"}.items():
+            archive.writestr(prefix + name, content)
+        for name in folders:
+            archive.writestr(name, b"")
+    faults: list[str] = []
+    assert read_fmu(path, faults).modelName == "Fake"
+    assert len(faults) == 1 and told in faults[0]
+    (tmp_path / "to").mkdir()
+    library, _ = open_fmu(path, tmp_path / "to")
+    assert library.read_bytes() == b"library"
+
+
+@pytest.mark.parametrize("name", ["C:/a", "./C:a", "/a", "../a"])
+def test_names_that_could_leave_the_folder_are_refused(tmp_path: Path, name: str) -> None:
+    path = write_zip(tmp_path / "a.fmu", {"modelDescription.xml": XML, LIBRARY: b"", name: b""})
+    with pytest.raises(ArchiveError, match=r"refused: (an absolute path|the path leaves the archive)"):
+        read_fmu(path, [])
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "told"),
+    [
+        ('<Real start="0"/>', "<Real/>", "has no start value"),
+        ('<Real start="0"/>', '<Boolean start="false"/>', 'must have variability != "continuous"'),
+        ('<Real start="0"/>', '<Real start="0" unit="furlong"/>', 'The unit "furlong"'),
+        ('modelName="Fake"', 'modelName="Fake" mood="good"', "The attribute 'mood' is not allowed"),
+    ],
+)
+def test_faults_of_a_model_description_are_told_to_those_who_ask_and_refused_for_others(
+    tmp_path: Path, old: str, new: str, told: str
+) -> None:
+    text = model_description([variable("y", "output"), variable("k", "input")])
+    assert old in text
+    path = write_zip(tmp_path / "a.fmu", {"modelDescription.xml": text.replace(old, new), LIBRARY: b""})
+    faults: list[str] = []
+    assert [v.name for v in read_fmu(path, faults).modelVariables] == ["y", "k"]
+    assert len(faults) == 1 and told in faults[0] and str(path) in faults[0]
+    with pytest.raises(ArchiveError, match=re.escape(told)):
+        read_fmu(path)
+    assert any(finding.level is Level.PROBLEM and told in finding.text for finding in examine(path))

@@ -120,6 +120,8 @@ class Faulty(Stub):
             self.y = math.nan
         if self.fault == 5:
             self.log("oil is low", Fmi2Status.warning)
+        if now and self.fault == 7:
+            self.y = math.inf
         if now and self.fault == 6:
             signal.raise_signal(signal.SIGINT)
         return True
@@ -141,6 +143,20 @@ class Echo(Stub):
             setattr(self, f"seen[{i}]", getattr(self, f"gyro[{i}]"))
             setattr(self, f"felt[{i}]", getattr(self, f"accel[{i}]"))
         return True
+""",
+    # An estimator that ends the run in the step from t = 0.5.
+    "finite": """
+class Finite(Stub):
+    def __init__(self, **kwargs):
+        super().__init__(**kwargs)
+        for i in (1, 2, 3):
+            self.add(Real, f"gyro[{i}]", IN)
+            self.add(Real, f"accel[{i}]", IN)
+        self.add(Real, "y", OUT, DISCRETE)
+
+    def do_step(self, t, h):
+        self.y = t
+        return t < 0.5
 """,
     "stillborn": """
 class Stillborn(Stub):

@@ -51,7 +51,7 @@ def _steps(system: System, h: float, parameters: Mapping[str, Any], in_process: 
         for instance in started:
             instance.connect(exchange.outlets(instance.name), exchange.inlets(instance.name))
             instance.ready()
-            instance.enter_initialisation([s for s in settings if s.component == instance.name], 0.0)
+            instance.enter_initialisation([s for s in settings if s.component == instance.name], 0.0, _STEPS * h)
             instance.exit_initialisation(0.0)
         for k in range(_STEPS):
             for instance in started:

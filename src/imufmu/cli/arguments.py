@@ -13,12 +13,17 @@ from ..files.atomic import check_not_read
 
 def parsed_sets(sets: list[str] | None) -> dict[str, Any]:
     """NAME=VALUE as a dict with numbers, truth values and vectors of them; other text, and text in quotes, as text."""
-    values: dict[str, Any] = {}
-    for text in sets or []:
+    return {name: _parsed(value) for name, value in parsed_pairs(sets, "--set", "c_a=0.2").items()}
+
+
+def parsed_pairs(texts: list[str] | None, option: str, example: str) -> dict[str, str]:
+    """NAME=VALUE as a dict of texts."""
+    values: dict[str, str] = {}
+    for text in texts or []:
         name, equals, value = text.partition("=")
         if not (name.strip() and equals and value.strip()):
-            raise typer.BadParameter(f"{text!r}: expected NAME=VALUE, such as c_a=0.2", param_hint="--set")
-        values[name.strip()] = _parsed(value.strip())
+            raise typer.BadParameter(f"{text!r}: expected NAME=VALUE, such as {example}", param_hint=option)
+        values[name.strip()] = value.strip()
     return values
 
 

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from ..cosim.errors import STEP_TIMEOUT
-from .arguments import check_folder, check_target, parsed_sets
+from .arguments import check_folder, check_target, parsed_pairs, parsed_sets
 from .console import Json, notes, out, print_json, print_table, progress_bar, written
 from .saving import kept, save
 
@@ -41,6 +41,10 @@ def run(
         bool, typer.Option("--jacobi", help="Take all inputs before the step, as simple masters do.")
     ] = False,
     native: Native = False,
+    treat: Annotated[
+        list[str] | None,
+        typer.Option("--treat", metavar="NAME=KIND", help="How a component steps: sampled or continuous. Repeatable."),
+    ] = None,
     strict: Strict = False,
     in_process: InProcess = False,
     step_timeout: StepTimeout = STEP_TIMEOUT,
@@ -88,6 +92,7 @@ def run(
             parameters=parsed_sets(sets),
             record=recorded(read) if report or animation else None,
             jacobi=jacobi,
+            treat=parsed_pairs(treat, "--treat", "plant=continuous"),
             in_process=in_process,
             step_timeout=step_timeout,
             progress=progress,

@@ -43,6 +43,7 @@ from .units import Unit
 
 FMU_TYPE = "application/x-fmu-sharedlibrary"
 _ROOT = "SystemStructureDescription"
+KINDS_OF_STEP = ("sampled", "continuous")
 _DEEPEST = 50  # systems in systems: more is a circle of references
 # Attributes that hold a step size (s), each with the type of the annotation that it is in.
 _STEPS = (
@@ -58,7 +59,8 @@ __all__ = ["NAMESPACES", "Component", "Connection", "Connector", "Description", 
 class Component:
     """One FMU of the system. name: with those of the systems around it.
 
-    implementation: ModelExchange or CoSimulation where the description wants one of these; else any.
+    implementation: ModelExchange or CoSimulation where the description wants one of these; else any. treat: how it
+    steps, one of KINDS_OF_STEP, where an annotation says so.
     """
 
     name: str
@@ -67,6 +69,7 @@ class Component:
     connectors: dict[str, Connector]
     where: str
     implementation: str = "any"
+    treat: str | None = None
 
 
 @dataclass(frozen=True)
@@ -255,10 +258,21 @@ class _Flat:
                 connectors,
                 files.where(element),
                 element.get("implementation", "any"),
+                _treatment(element, files),
             )
         )
         self._bind(element, name, files, source, depth)
         return "Component"
+
+
+def _treatment(element: Any, files: Sources) -> str | None:
+    """What an annotation says of how a component steps; see schedule.py."""
+    for mark in element.iterfind("ssd:Annotations/ssc:Annotation[@type='org.imufmu']/imufmu:Treat", NAMESPACES):
+        kind = required(mark, "as", files.ssd)
+        if kind not in KINDS_OF_STEP:
+            raise DescriptionError(f"{files.where(mark)}: as={kind!r}: expected {' or '.join(KINDS_OF_STEP)}")
+        return kind
+    return None
 
 
 def _joined(system: str, name: str) -> str:

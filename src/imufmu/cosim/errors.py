@@ -14,3 +14,7 @@ class SimulationError(RuntimeError):
     """
 
     result: Any = None
+
+
+class EndOfRun(SimulationError):
+    """An FMU asks to end the run, which is no failure once the run has begun; the message says who and when."""

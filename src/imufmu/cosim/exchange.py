@@ -56,12 +56,15 @@ class Exchange:
     def outlets(self, component: str) -> list[Outlet]:
         """What a component reads."""
         outlets = []
+        feeding = {(link.source[0], link.source[1].name) for link in self._links}
         for kind, some in self._variables.items():
             own = [i for i, (name, _) in enumerate(some) if name == component]
             if own:
                 variables = [some[i][1] for i in own]
                 outputs = sum(variable.causality == "output" for variable in variables)
-                outlets.append(Outlet(kind, variables, outputs, self.values[kind][own[0] : own[-1] + 1]))
+                needed = [i for i, variable in enumerate(variables) if (component, variable.name) in feeding]
+                values = self.values[kind][own[0] : own[-1] + 1]
+                outlets.append(Outlet(kind, variables, outputs, values, needed))
         return outlets
 
     def inlets(self, component: str) -> list[Inlet]:

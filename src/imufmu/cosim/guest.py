@@ -13,10 +13,10 @@ from typing import Any
 import numpy as np
 
 from ..fmi.child import Child
-from .errors import SimulationError
+from .errors import EndOfRun, SimulationError
 from .settings import Setting
 from .slave import CALLS, STEPS, Inlet, Inputs, Outlet, Unpacked, Variable, quoted, when
-from .wire import Numbers, Shared, Verb, receive_answer, send_command
+from .wire import Answer, Numbers, Shared, Verb, receive_answer, send_command
 
 _START_TIMEOUT = 60.0  # s, of Python itself, however short the user's patience with the FMU
 _LAST_TIMEOUT = 5.0  # s, to be freed after another component has failed
@@ -77,7 +77,7 @@ class Guest:
             "path": [entry for entry in sys.path if entry],
             "memory": str(memory),
             "inlets": [_end(inlet) for inlet in inlets],
-            "outlets": [_end(outlet) | {"outputs": outlet.outputs} for outlet in outlets],
+            "outlets": [_end(outlet) | {"outputs": outlet.outputs, "needed": outlet.needed} for outlet in outlets],
         }
         self._send(Verb.CONNECT, (0.0, 0.0, 0.0), plan)
 
@@ -86,10 +86,10 @@ class Guest:
         self._receive(max(self._limit, _START_TIMEOUT))
         self._request(Verb.INSTANTIATE, 0.0)
 
-    def enter_initialisation(self, settings: Sequence[Setting], start_time: float) -> None:
-        """Apply the start values and enter initialization mode."""
+    def enter_initialisation(self, settings: Sequence[Setting], start_time: float, stop_time: float) -> None:
+        """Apply the start values and enter initialization mode, for a run between these times (s)."""
         starts = [(Variable.of(s.variable), s.value) for s in settings]
-        self._request(Verb.ENTER, start_time, data=starts)
+        self._request(Verb.ENTER, start_time, stop_time - start_time, stop_time, data=starts)
 
     def exit_initialisation(self, time: float) -> None:
         """Leave initialization mode: the instance can step from here on."""
@@ -163,11 +163,13 @@ class Guest:
         if not wait():
             raise self._lost(f"gave no answer within {limit:g} s")
         try:
-            good, text = receive_answer(self._child.answers, wait)
+            kind, text = receive_answer(self._child.answers, wait)
         except EOFError:
             raise self._lost(self._child.fate()) from None
         self._busy = False
-        if not good:
+        if kind == Answer.ENDED:
+            raise EndOfRun(text)
+        if kind == Answer.FAILED:
             raise SimulationError(text)
         return text
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 from collections import Counter
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
@@ -58,7 +59,7 @@ class Interface:
         return unit
 
     def elements(self, name: str) -> list[str]:
-        """Names of the elements of a vector or matrix, in the order of the FMU; empty for any other name."""
+        """Names of the elements of a vector or matrix, in the order of their indices; empty for any other name."""
         return self._elements.get(name, [])
 
     @cached_property
@@ -68,7 +69,13 @@ class Interface:
             name, bracket, _ = variable.rpartition("[")
             if bracket and variable.endswith("]"):
                 found.setdefault(name, []).append(variable)
-        return found
+        return {name: sorted(elements, key=_index) for name, elements in found.items()}
+
+    def counts_from(self, name: str) -> int | None:
+        """0 or 1 for an element such as x[2] of a vector with three or more of that number on; None for any other."""
+        vector = name.rpartition("[")[0]
+        elements = self.elements(vector)
+        return next((i for i in (0, 1) if elements[:3] == [f"{vector}[{i + k}]" for k in range(3)]), None)
 
     def of(self, *causalities: str) -> list[Any]:
         """Variables of these causalities, in the order of the FMU."""
@@ -82,6 +89,12 @@ class Interface:
         """End of a message: variables of this causality and unit (None: any), those most like ``name`` first."""
         fitting = [v.name for v in self.of(causality) if unit is None or unit_of(v) == unit]
         return f"{causality.capitalize()}s of {self.component}{f' in {unit}' if unit else ''}: {near(name, fitting)}"
+
+
+def _index(element: str) -> tuple[int, ...]:
+    """Indices of an element, such as (2, 1) of x[2,1]; those that are no numbers come last."""
+    inside = element.rpartition("[")[2].rstrip("]").split(",")
+    return tuple(int(text) if text.strip().isdecimal() else sys.maxsize for text in inside)
 
 
 def representation(variable: Any) -> str:

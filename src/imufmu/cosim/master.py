@@ -1,8 +1,8 @@
 """The co-simulation master: a fixed communication step, counted in integer ticks, along the signal flow.
 
-Two kinds of FMU, told apart by their outputs. A **sampled** one (all outputs discrete: IMU, estimator, controller)
-answers to the inputs of time t: doStep(t, h) processes the samples in [t, t + h). A **continuous** one (a plant)
-advances: its outputs after doStep(t, h) are those of t + h. So a tick from t to t + h is
+Two kinds of FMU, told apart as schedule.py says. A **sampled** one (IMU, estimator) answers to the inputs of time t:
+doStep(t, h) processes the samples in [t, t + h). A **continuous** one (a plant) advances: its outputs after
+doStep(t, h) are those of t + h. So a tick from t to t + h is
 
     1  sampled FMUs, along the signal flow: set inputs, doStep(t, h), get outputs
     2  record the row of time t: truth and samples belong together, no delay is added
@@ -24,11 +24,11 @@ from typing import Any
 import numpy as np
 
 from .apart import Instance, Instances
-from .errors import STEP_TIMEOUT, SimulationError
+from .errors import STEP_TIMEOUT, EndOfRun, SimulationError
 from .exchange import Exchange
 from .interrupt import Terminated, interrupt_between_calls
-from .order import signal_flow
 from .results import Result
+from .schedule import Schedule
 from .settings import Setting
 from .system import Part, System, locate
 
@@ -50,6 +50,11 @@ class Ticks:
         """Communication point k."""
         return self.start + k * self.h
 
+    @property
+    def end(self) -> float:
+        """The end of the last step, which no step passes by a rounding."""
+        return max(self.time(self.count), self.time(self.count - 1) + self.h)
+
 
 def simulate(
     system: System | str | Path,
@@ -60,6 +65,7 @@ def simulate(
     parameters: Mapping[str, Any] | None = None,
     record: Sequence[str] | None = None,
     jacobi: bool = False,
+    treat: Mapping[str, str] | None = None,
     native: bool = False,
     in_process: bool = False,
     step_timeout: float = STEP_TIMEOUT,
@@ -69,22 +75,24 @@ def simulate(
 
     Times in s; what is not given comes from the description, a step also from the FMUs (the smallest they prefer).
     parameters: start values by ``component.variable``, a vector by its name. record: names of variables or vectors
-    (default: all outputs). native: as in System.read. progress(done, total), in ticks, is called now and then.
+    (default: all outputs). treat: "sampled" or "continuous" by component, where an FMU does not tell what it is.
+    native: as in System.read. progress(done, total), in ticks, is called now and then.
 
     FMUs that imufmu has not built run in a process each, and may crash or hang there. in_process: let them share ours,
     which is faster and can be debugged, and which they may take along. step_timeout: s, how long such an FMU may take
     for a call.
 
-    Raises WiringError and what System.read raises for a system that does not fit, ValueError for impossible times,
-    SimulationError for a run that fails. That, and KeyboardInterrupt, has the rows up to there as ``result``, where
-    there are any. Whatever happens, no instance, no process and no temporary file stays behind.
+    An FMU may end the run; the result then ends there, with a note. Raises WiringError and what System.read raises for
+    a system that does not fit, ValueError for impossible times, SimulationError for a run that fails. That, and
+    KeyboardInterrupt, has the rows up to there as ``result``, where there are any. Whatever happens, no instance, no
+    process and no temporary file stays behind.
     """
     if not isinstance(system, System):
         system = System.read(locate(system), native=native)
     settings = system.settings_with(parameters or {})
     ticks = _ticks(system, start_time, stop_time, step)
     exchange = Exchange(system, record)
-    schedule = _Schedule(system, jacobi)
+    schedule = Schedule(system, jacobi, treat or {})
     notes = [*system.notes, *_period_notes(system, settings, ticks.h), *schedule.notes]
 
     def result(partial: str = "") -> Result:
@@ -99,9 +107,9 @@ def simulate(
                 slave.connect(exchange.outlets(name), exchange.inlets(name))
             for slave in slaves.values():
                 slave.ready()
-            notes += _initialise(slaves, schedule, exchange, settings, ticks.start)
+            notes += _initialise(slaves, schedule, exchange, settings, ticks)
             exchange.new_tables(ticks.count + 1)
-            _run(slaves, schedule, exchange, ticks, check, progress)
+            notes += _run(slaves, schedule, exchange, ticks, check, progress)
             for slave in slaves.values():
                 notes += slave.notes
             for slave in slaves.values():
@@ -135,29 +143,6 @@ def _ticks(system: System, start: float | None, stop: float | None, h: float | N
     return Ticks(start, h, max(1, math.ceil(count - rounding)))
 
 
-def _is_sampled(part: Part) -> bool:
-    outputs = [variable for variable in part.model.modelVariables if variable.causality == "output"]
-    return all(variable.variability == "discrete" or variable.type != "Real" for variable in outputs)
-
-
-class _Schedule:
-    """The order of each phase of a tick, and of initialisation. notes: where loops are broken."""
-
-    def __init__(self, system: System, jacobi: bool) -> None:
-        names = [part.name for part in system.parts]
-        edges = {(link.source[0], link.target[0]) for link in system.links}
-        sampled = [part.name for part in system.parts if _is_sampled(part)]
-        self.jacobi = jacobi
-        self.initial, _ = signal_flow(names, edges)
-        self.sampled, broken = signal_flow(sampled, edges)
-        self.continuous, broken_too = signal_flow([name for name in names if name not in sampled], edges)
-        self.notes = [
-            f"loop of connections: {link} carries the value from before the step"
-            for link in system.links
-            if not jacobi and (link.source[0], link.target[0]) in (*broken, *broken_too)
-        ]
-
-
 def _period_notes(system: System, settings: Sequence[Setting], h: float) -> list[str]:
     """Sampled blocks whose samples do not fall on communication points."""
     notes = []
@@ -181,11 +166,12 @@ def _start(parts: Sequence[Part], instances: Instances) -> dict[str, Instance]:
 
 
 def _initialise(
-    slaves: Mapping[str, Instance], schedule: _Schedule, exchange: Exchange, settings: Sequence[Setting], time: float
+    slaves: Mapping[str, Instance], schedule: Schedule, exchange: Exchange, settings: Sequence[Setting], ticks: Ticks
 ) -> list[str]:
     """Start values, then outputs exchanged until they settle."""
+    time, end = ticks.start, ticks.end
     for name, slave in slaves.items():
-        slave.enter_initialisation([setting for setting in settings if setting.component == name], time)
+        slave.enter_initialisation([setting for setting in settings if setting.component == name], time, end)
     settled = False
     for _ in range(len(slaves) + 1):
         before = {kind: values.copy() for kind, values in exchange.values.items()}
@@ -193,7 +179,7 @@ def _initialise(
             slaves[name].gather()
             slaves[name].write(time)
             slaves[name].read_initial(time)
-        settled = all(np.array_equal(before[kind], values) for kind, values in exchange.values.items())
+        settled = all(np.array_equal(before[kind], now, equal_nan=True) for kind, now in exchange.values.items())
         if settled:
             break
     for name in schedule.initial:
@@ -204,13 +190,13 @@ def _initialise(
 
 def _run(
     slaves: Mapping[str, Instance],
-    schedule: _Schedule,
+    schedule: Schedule,
     exchange: Exchange,
     ticks: Ticks,
     check: Callable[[], None],
     progress: Progress | None,
-) -> None:
-    """All ticks; every row recorded."""
+) -> list[str]:
+    """All ticks, or those before an FMU ends the run, which is returned as a note; every row recorded."""
     sampled = [slaves[name] for name in schedule.sampled]
     continuous = [slaves[name] for name in schedule.continuous]
     h, reported = ticks.h, clock.monotonic()
@@ -219,16 +205,22 @@ def _run(
         if schedule.jacobi:
             for slave in slaves.values():
                 slave.gather()
-        for slave in sampled:
-            _advance(slave, t, h, t, not schedule.jacobi)
-        exchange.record(k)
-        for slave in continuous:
-            _advance(slave, t, h, ticks.time(k + 1), not schedule.jacobi)
+        try:
+            for slave in sampled:
+                _advance(slave, t, h, t, not schedule.jacobi)
+            exchange.record(k)
+            for slave in continuous:
+                _advance(slave, t, h, ticks.time(k + 1), not schedule.jacobi)
+        except EndOfRun as end:
+            if exchange.rows == k:  # the last row of a run holds the samples before it
+                exchange.record(k)
+            return [f"{end}; {exchange.rows} of {ticks.count + 1} rows"]
         check()
         if progress and (k + 1 == ticks.count or clock.monotonic() - reported > _BETWEEN_PROGRESS):
             progress(k + 1, ticks.count)
             reported = clock.monotonic()
     exchange.record(ticks.count)
+    return []
 
 
 def _advance(slave: Instance, t: float, h: float, reached: float, gather: bool) -> None:

@@ -22,7 +22,7 @@ from ..fmi.own import is_ours
 from ..recordings.reading import Recording, hold_missing
 from ..registry import BLOCKS, ESTIMATORS
 from .apart import Instance, Instances
-from .errors import STEP_TIMEOUT, SimulationError
+from .errors import STEP_TIMEOUT, EndOfRun, SimulationError
 from .interface import Interface, WiringError, unit_of
 from .interrupt import Terminated, interrupt_between_calls
 from .links import Wiring
@@ -123,6 +123,7 @@ def replay(
     settings = _settings(interface, recording, dict(parameters or {}), fmu)
     outputs = [v for v in interface.of("output") if v.type == "Real"]
     reported = outputs + [v for v in interface.of("local") if v.type == "Real" and local_variables]
+    ended = ""
     run = _Run(readings, float(recording.time[0]), recording.sample_period, len(reported))
 
     def result(partial: str = "") -> Replay:
@@ -146,7 +147,12 @@ def replay(
             inlet = Inlet("Real", used, run.now, sources, np.ones(len(used)), np.zeros(len(used)))
             slave.connect([Outlet("Real", reported, len(outputs), run.values)], [inlet])
             slave.ready()
-            run(slave, settings, check, progress)
+            try:
+                run(slave, settings, check, progress)
+            except EndOfRun as end:
+                if not run.done:
+                    raise
+                ended = str(end)
             notes += slave.notes
             slave.close()
     except (SimulationError, KeyboardInterrupt, Terminated) as error:
@@ -154,7 +160,7 @@ def replay(
             reason = str(error) if isinstance(error, SimulationError) else "interrupted"
             error.result = result(reason)  # type: ignore[union-attr]
         raise
-    return result()
+    return result(ended)
 
 
 class _Run:
@@ -177,7 +183,7 @@ class _Run:
         progress: Callable[[int, int], None] | None,
     ) -> None:
         start, period = self._start, self._period
-        slave.enter_initialisation(settings, start)
+        slave.enter_initialisation(settings, start, start + len(self._readings) * period)
         self.now[:] = self._readings[0]
         slave.gather()
         slave.write(start)

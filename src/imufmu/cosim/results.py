@@ -6,7 +6,7 @@ HDF5 because Python, MATLAB (h5read) and Julia read it with what they come with 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import chain
@@ -52,31 +52,33 @@ class Result(Tabular):
         return list(self.columns)
 
     def __getitem__(self, name: str) -> np.ndarray:
-        """(n,) of a variable; (n, k) or (n, k, m) of a vector or matrix by its name without brackets."""
+        """(n,) of a variable; (n, k) or (n, k, m) of a vector or matrix by its name without brackets.
+
+        Elements are numbered from 1 or, where one is numbered 0, from 0.
+        """
         if name in self.columns:
             return self.columns[name]
         if name not in self._arrays:
             raise KeyError(f"{name!r} was not recorded. Near: {near(name, [*self.columns, *self._arrays])}")
         elements = [self.columns[column] for column in self._elements(name)]
-        return np.stack(elements, axis=-1).reshape(-1, *self._arrays[name])
+        return np.stack(elements, axis=-1).reshape(-1, *self._arrays[name].shape)
 
     def __contains__(self, name: str) -> bool:
         return name in self.columns or name in self._arrays
 
     @cached_property
-    def _arrays(self) -> dict[str, tuple[int, ...]]:
-        """Shapes of the vectors and matrices whose every element was recorded."""
-        highest: dict[str, tuple[int, ...]] = {}
+    def _arrays(self) -> dict[str, _Array]:
+        """The vectors and matrices whose every element was recorded."""
+        indices: dict[str, list[tuple[int, ...]]] = {}
         for column in self.columns:
             match = _ELEMENT.fullmatch(column)
             if match:
-                index = tuple(map(int, match[2].split(",")))
-                largest = highest.get(match[1], index)
-                highest[match[1]] = tuple(map(max, index, largest)) if len(largest) == len(index) else ()
+                indices.setdefault(match[1], []).append(tuple(map(int, match[2].split(","))))
+        arrays = {name: _array(found) for name, found in indices.items() if len({len(index) for index in found}) == 1}
         return {
-            name: shape
-            for name, shape in highest.items()
-            if shape and all(_element(name, index) in self.columns for index in np.ndindex(shape))
+            name: array
+            for name, array in arrays.items()
+            if all(_element(name, index, array.first) in self.columns for index in np.ndindex(array.shape))
         }
 
     def as_array(self) -> np.ndarray:
@@ -97,11 +99,20 @@ class Result(Tabular):
     def to_hdf5(self, path: str | Path) -> list[str]:
         """Write ``/time`` and one dataset per variable, ``/component/variable``; a vector is one dataset (n, k).
 
-        Each dataset has the attribute ``unit`` where the FMU names one; the file has ``system`` and ``notes``, and
+        Each dataset has the attribute ``unit`` where the FMU names one, and ``first_index`` 0 where its elements are
+        numbered from 0; the file has ``system`` and ``notes``, and
         ``partial`` where the result is. Returns notes on variables whose names HDF5 cannot hold: see ``write_hdf5``.
         Raises WriteError.
         """
-        variables = (Dataset(name.split(".", 1), self[name], self.units[first]) for name, first in self._datasets())
+        variables = (
+            Dataset(
+                name.split(".", 1),
+                self[name],
+                self.units[first],
+                self._arrays[name].first if name not in self.columns else 1,
+            )
+            for name, first in self._datasets()
+        )
         attributes: dict[str, Any] = {"system": self.system, "notes": list(self.notes)}
         if self.partial:
             attributes["partial"] = self.partial
@@ -117,7 +128,8 @@ class Result(Tabular):
 
     def _elements(self, name: str) -> list[str]:
         """Columns of a vector or matrix, row by row."""
-        return [_element(name, index) for index in np.ndindex(self._arrays[name])]
+        array = self._arrays[name]
+        return [_element(name, index, array.first) for index in np.ndindex(array.shape)]
 
     def _datasets(self) -> Iterator[tuple[str, str]]:
         """Names of whole vectors and of other columns, in order, each with its first column."""
@@ -146,7 +158,7 @@ def read_hdf5(path: str | Path) -> Result:
             return
         values, full_name = item[()], str(item.attrs.get("name", name.replace("/", ".", 1)))
         for index in np.ndindex(values.shape[1:]):
-            column = _element(full_name, index) if index else full_name
+            column = _element(full_name, index, int(item.attrs.get("first_index", 1))) if index else full_name
             columns[column] = np.ascontiguousarray(values[(slice(None), *index)])
             units[column] = item.attrs.get("unit")
 
@@ -160,6 +172,19 @@ def read_hdf5(path: str | Path) -> Result:
         raise ValueError(f"{path}: cannot be read as a result: {error}") from error
 
 
-def _element(name: str, index: tuple[int, ...]) -> str:
-    """Name of the element with an index that counts from 0."""
-    return f"{name}[{','.join(str(i + 1) for i in index)}]"
+@dataclass(frozen=True)
+class _Array:
+    """A vector or matrix. first: what its indices count from."""
+
+    shape: tuple[int, ...]
+    first: int
+
+
+def _array(indices: Sequence[tuple[int, ...]]) -> _Array:
+    first = 0 if any(0 in index for index in indices) else 1
+    return _Array(tuple(max(along) + 1 - first for along in zip(*indices, strict=True)), first)
+
+
+def _element(name: str, index: tuple[int, ...], first: int) -> str:
+    """Name of the element with an index that counts from 0. first: what the indices in names count from."""
+    return f"{name}[{','.join(str(i + first) for i in index)}]"

@@ -10,7 +10,8 @@ import importlib
 import os
 import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from ctypes import POINTER, c_char_p, c_double, c_int, c_uint
+from contextlib import suppress
+from ctypes import POINTER, byref, c_char_p, c_double, c_int, c_uint
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -20,7 +21,7 @@ import numpy as np
 from fmpy.fmi1 import FMICallException
 from fmpy.fmi2 import FMU2Slave, fmi2Discard, fmi2Fatal, fmi2OK, fmi2True, fmi2Warning
 
-from .errors import SimulationError
+from .errors import EndOfRun, SimulationError
 from .messages import Messages
 
 if TYPE_CHECKING:
@@ -60,6 +61,7 @@ CALLS = (
 _DO_STEP = CALLS.index("fmi2DoStep")
 STEPS = (INTEGRATION, "fmi2DoStep", "fmi3DoStep")
 
+_TERMINATED = 3  # fmi2Terminated of fmi2StatusKind
 Call = tuple[int, Callable[[], int]]  # number of an FMI function, and a call of it
 
 
@@ -105,12 +107,16 @@ class Variable(NamedTuple):
 
 @dataclass(frozen=True)
 class Outlet:
-    """Variables of one kind that are read together into ``values``; the first ``outputs`` of them are outputs."""
+    """Variables of one kind that are read together into ``values``; the first ``outputs`` of them are outputs.
+
+    needed: places of those that must be finite, as something is fed by them; None: all.
+    """
 
     kind: str
     variables: Sequence[Any]
     outputs: int
     values: np.ndarray
+    needed: Sequence[int] | None = None
 
 
 @dataclass(frozen=True)
@@ -188,6 +194,7 @@ class Slave:
         self._sets: list[Call] = []
         self._reals: list[tuple[Outlet, np.ndarray]] = []
         self._warned = False
+        self._odd: dict[str, str] = {}  # remarks on values by name
         self._prepare_step(fmu)
 
     def _instantiate(self) -> None:
@@ -235,8 +242,8 @@ class Slave:
     def ready(self) -> None:
         """Wait until the instance is there: at once in this process."""
 
-    def enter_initialisation(self, settings: Sequence[Setting], start_time: float) -> None:
-        """Apply the start values and enter initialization mode."""
+    def enter_initialisation(self, settings: Sequence[Setting], start_time: float, stop_time: float) -> None:
+        """Apply the start values and enter initialization mode, for a run between these times (s)."""
         for setting in settings:
             variable, value = setting.variable, setting.value
             if isinstance(value, str):
@@ -245,7 +252,7 @@ class Slave:
                 kind = KINDS[type(value)]
                 calls = self._calls("Set", kind, [variable], self._array([setting], DTYPES[kind]))
             self._make(calls, f"{variable.name} = {value}")
-        self._enter(start_time)
+        self._enter(start_time, stop_time)
 
     def _array(self, settings: Sequence[Setting], dtype: Any) -> np.ndarray:
         """Their values. Raises SimulationError for a whole number that is too large."""
@@ -262,10 +269,10 @@ class Slave:
             self._function(name), self._instance, references([variable.valueReference]), 1, value
         )
 
-    def _enter(self, start_time: float) -> None:
+    def _enter(self, start_time: float, stop_time: float) -> None:
         """Enter initialization mode."""
         at = when(start_time)
-        self._plain("fmi2SetupExperiment", at, 0, 0.0, start_time, 0, 0.0)
+        self._plain("fmi2SetupExperiment", at, 0, 0.0, start_time, 1, stop_time)
         self._plain("fmi2EnterInitializationMode", at)
 
     def exit_initialisation(self, time: float) -> None:
@@ -293,22 +300,40 @@ class Slave:
 
     def _judge(self, status: int, time: float, h: float) -> None:
         """What a step has returned: an error is raised, the first warning kept."""
+        if status == fmi2Discard and self._ends():
+            raise EndOfRun(f"{self.name} ended the run at {when(time, h)}{self._last_words()}")
         if status not in GOOD:
             raise self._failure(f"{self._fmi}DoStep", status, when(time, h))
         if status == fmi2Warning and not self._warned:
             self._warned = True
             self.messages.add(status, f"{self._fmi}DoStep at {when(time)} returned a warning")
 
+    def _ends(self) -> bool:
+        """Whether the step was discarded because the FMU is at its end (FMI 2.0.5, 4.2.3)."""
+        ended = c_int()
+        with suppress(AttributeError):  # it lacks the function
+            self._function("fmi2GetBooleanStatus")(self._instance, _TERMINATED, byref(ended))
+        return bool(ended.value)
+
+    def _last_words(self) -> str:
+        return quoted(self.messages.latest) if self.messages.latest else ""
+
     def read(self, time: float) -> None:
-        """Get the variables; none may be other than finite."""
+        """Get the variables; those that feed something must be finite."""
         self._make(self._gets, time)
         for outlet, zeros in self._reals:
             if outlet.values.dot(zeros) != 0.0:  # nan or infinity times zero is not
-                i = int(np.argmin(np.isfinite(outlet.values)))
+                self._judge_values(outlet, time)
+
+    def _judge_values(self, outlet: Outlet, time: float) -> None:
+        """Some are not finite: an error where they feed something, else worth a word."""
+        for i in np.flatnonzero(~np.isfinite(outlet.values)).tolist():
+            name = outlet.variables[i].name
+            if outlet.needed is None or i in outlet.needed:
                 raise SimulationError(
-                    f"{self.name}.{outlet.variables[i].name} = {outlet.values[i]} at {when(time)}"
-                    + quoted(self.messages.latest)
+                    f"{self.name}.{name} = {outlet.values[i]} at {when(time)}" + quoted(self.messages.latest)
                 )
+            self._odd.setdefault(name, f"{name} = {outlet.values[i]} at {when(time)}; nothing is fed by it")
 
     def read_initial(self, time: float) -> None:
         """Get the outputs during initialisation, where FMI allows no other variable."""
@@ -328,9 +353,9 @@ class Slave:
 
     @property
     def notes(self) -> list[str]:
-        """What the FMU warned of."""
+        """What the FMU warned of, and which of its values were odd."""
         own = f"{self.name}: "  # some FMUs begin their messages with their name
-        return [own + text.removeprefix(own) for text in self.messages.warnings]
+        return [own + text.removeprefix(own) for text in (*self.messages.warnings, *self._odd.values())]
 
     def close(self) -> None:
         """Terminate and free the instance, as far as FMI allows after what happened, and unload its library."""

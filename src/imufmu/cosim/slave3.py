@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from fmpy.fmi3 import FMU3Slave
 
-from .errors import SimulationError
+from .errors import EndOfRun, SimulationError
 from .slave import CALLS, DTYPES, GOOD, KINDS, WIRES, Call, Slave, Unpacked, references, when
 
 if TYPE_CHECKING:
@@ -44,9 +44,12 @@ class Slave3(Slave):
         self._now.value = _DO_STEP
         self._judge(self._do_step(self._instance, time, h, True), time, h)
         if self._ended.value:
-            raise SimulationError(f"{self.name}: fmi3DoStep asks to end the run at {when(time, h)}")
+            raise EndOfRun(f"{self.name} ended the run at {when(time, h)}{self._last_words()}")
 
-    def enter_initialisation(self, settings: Sequence[Setting], start_time: float) -> None:
+    def _ends(self) -> bool:
+        return bool(self._ended.value)
+
+    def enter_initialisation(self, settings: Sequence[Setting], start_time: float, stop_time: float) -> None:
         """As ``Slave.enter_initialisation``; the elements of an array are set together."""
         for _, group in groupby(settings, lambda s: (s.variable.valueReference, s.variable.size > 1)):
             some = list(group)
@@ -58,7 +61,7 @@ class Slave3(Slave):
                 values = self._array(some, np.int64 if kind == "Integer" else DTYPES[kind])
                 calls = self._calls("Set", kind, [s.variable for s in some], values)
             self._make(calls, at)
-        self._enter(start_time)
+        self._enter(start_time, stop_time)
 
     def _set_text(self, variable: Any, text: str) -> Call:
         if variable.size > 1:
@@ -67,8 +70,8 @@ class Slave3(Slave):
         reference = references([variable.valueReference])
         return CALLS.index(name), partial(self._function(name), self._instance, reference, 1, value, 1)
 
-    def _enter(self, start_time: float) -> None:
-        self._plain("fmi3EnterInitializationMode", when(start_time), False, 0.0, start_time, False, 0.0)
+    def _enter(self, start_time: float, stop_time: float) -> None:
+        self._plain("fmi3EnterInitializationMode", when(start_time), False, 0.0, start_time, True, stop_time)
 
     def _calls(self, verb: str, kind: str, variables: Sequence[Any], values: np.ndarray) -> list[Call]:
         """One call per type of FMI 3.0."""

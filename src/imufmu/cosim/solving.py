@@ -13,7 +13,7 @@ from fmpy.fmi1 import FMICallException
 from fmpy.fmi2 import FMU2Model
 from fmpy.fmi3 import FMU3Model
 
-from .errors import SimulationError
+from .errors import EndOfRun, SimulationError
 from .slave import CALLS, INTEGRATION, Equations, Slave, Unpacked, quoted, when
 from .slave3 import Slave3
 
@@ -56,6 +56,8 @@ class _Solved(Slave):
             work()
         except FMICallException as error:
             raise self._failure(error.function, error.status, at) from error
+        except EndOfRun:
+            raise EndOfRun(f"{self.name} ended the run at {at}{self._last_words()}") from None
         except SimulationError:
             raise
         except Exception as error:  # fmpy raises plain exceptions
@@ -151,7 +153,7 @@ class _Solver:
 
     def _refuse_end(self, ended: bool) -> None:
         if ended:
-            raise RuntimeError("asks to end the run")
+            raise EndOfRun
 
     def _kept(self, function: Callable[..., Any]) -> Callable[..., Any]:
         """The function, which the solver calls by way of C: an exception would be lost on that way."""

@@ -21,7 +21,7 @@ from .slave import DTYPES
 
 _COMMAND = struct.Struct("=iIddd")  # verb, bytes of data, three times
 _ANSWER = struct.Struct("=iI")  # done or failed, bytes of text
-_DONE = _ANSWER.pack(True, 0)
+_DONE = _ANSWER.pack(1, 0)
 _LONGEST_ANSWER = 2**20  # bytes
 _NOW, _SAID, _BUFFERS = 0, 8, 1024  # places in the shared memory
 _MOST_SAID = _BUFFERS - _SAID - 4
@@ -34,6 +34,12 @@ class Verb:
     """What the process is asked to do. Plain numbers: members of an Enum would cost more than the pipe."""
 
     ADVANCE, CONNECT, INSTANTIATE, ENTER, WRITE, READ_INITIAL, EXIT, READ, NOTES, FREE = range(10)
+
+
+class Answer:
+    """What came of a command: nothing, all that was wanted, or the end of the run. Plain numbers, as Verb."""
+
+    FAILED, DONE, ENDED = range(3)
 
 
 def send_command(pipe: int, verb: int, times: Numbers, data: Any = None) -> None:
@@ -51,16 +57,16 @@ def receive_command(pipe: int) -> tuple[int, Numbers, Any]:
     return verb, (time, h, reached), json.loads(_read(pipe, size)) if size else None
 
 
-def send_answer(pipe: int, good: bool, text: str = "") -> None:
-    """good: False with the text of the error."""
-    if good and not text:
+def send_answer(pipe: int, kind: int, text: str = "") -> None:
+    """kind: one of Answer, with the text of the error or end."""
+    if kind == Answer.DONE and not text:
         os.write(pipe, _DONE)
     else:
         content = text.encode(errors="replace")
-        _write(pipe, _ANSWER.pack(good, len(content)) + content)
+        _write(pipe, _ANSWER.pack(kind, len(content)) + content)
 
 
-def receive_answer(pipe: int, wait: Callable[[], bool]) -> tuple[bool, str]:
+def receive_answer(pipe: int, wait: Callable[[], bool]) -> tuple[int, str]:
     """The answer to the last command, the beginning of which is there.
 
     wait: waits for more; False where there is none in time. Raises EOFError where no answer can come any more, also
@@ -68,11 +74,11 @@ def receive_answer(pipe: int, wait: Callable[[], bool]) -> tuple[bool, str]:
     """
     header = os.read(pipe, _ANSWER.size)
     if header == _DONE:
-        return True, ""
+        return Answer.DONE, ""
     if len(header) < _ANSWER.size:
         raise EOFError
-    good, size = _ANSWER.unpack(header)
-    if good not in (True, False) or size > _LONGEST_ANSWER:
+    kind, size = _ANSWER.unpack(header)
+    if kind not in (Answer.FAILED, Answer.DONE, Answer.ENDED) or size > _LONGEST_ANSWER:
         raise EOFError
     text = b""
     while len(text) < size:
@@ -80,7 +86,7 @@ def receive_answer(pipe: int, wait: Callable[[], bool]) -> tuple[bool, str]:
         if not more:
             raise EOFError
         text += more
-    return bool(good), text.decode(errors="replace")
+    return kind, text.decode(errors="replace")
 
 
 def _write(pipe: int, content: bytes) -> None:

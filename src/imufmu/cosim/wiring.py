@@ -43,6 +43,7 @@ def find_wiring(
             problems.append(checks.misfit(way, error))
             continue
         checks.note_missing_unit(way)
+        checks.note_shifted_index(way)
     wiring.links = tuple(links)
     return wiring
 
@@ -168,3 +169,14 @@ class _Checks:
             ends = [(c, self.wiring.interfaces[c].variables[v]) for c, v in (way[0], way[-1])]
             names = " -> ".join(label(*end) for end in ends)
             self.notes.append(f"{names}: one end does not name its unit; taken for the same")
+
+    def note_shifted_index(self, way: Sequence[Node]) -> None:
+        """Say so where equal indices are not the same axis: one end counts from 0, the other from 1."""
+        first, last = way[0], way[-1]
+        counts = [self.wiring.interfaces[c].counts_from(v) for c, v in (first, last)]
+        if None not in counts and counts[0] != counts[1] and first[1].partition("[")[2] == last[1].partition("[")[2]:
+            ends = [
+                f"{c}.{v.rpartition('[')[0]} counts from {i}" for (c, v), i in zip((first, last), counts, strict=True)
+            ]
+            names = " -> ".join(".".join(node) for node in (first, last))
+            self.notes.append(f"{names}: {' and '.join(ends)}: the axes are shifted by one; is that meant?")

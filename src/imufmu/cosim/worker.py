@@ -19,10 +19,10 @@ from typing import Any, NamedTuple, NoReturn
 
 import numpy as np
 
-from .errors import SimulationError
+from .errors import EndOfRun, SimulationError
 from .kinds import slave_of
 from .slave import Equations, Inlet, Outlet, Slave, Unpacked, Variable
-from .wire import Numbers, Shared, Verb, receive_command, send_answer
+from .wire import Answer, Numbers, Shared, Verb, receive_command, send_answer
 
 
 class Start(NamedTuple):
@@ -43,10 +43,12 @@ def main() -> NoReturn:
             verb, times, data = receive_command(commands)
             try:
                 said = server.perform(verb, times, data)
+            except EndOfRun as error:
+                send_answer(answers, Answer.ENDED, str(error))
             except SimulationError as error:
-                send_answer(answers, False, str(error))
+                send_answer(answers, Answer.FAILED, str(error))
             else:
-                send_answer(answers, True, said)
+                send_answer(answers, Answer.DONE, said)
             if verb == Verb.FREE:
                 break
     _leave()
@@ -70,7 +72,7 @@ class _Server:
             self._instantiate(self._plan)
         elif verb == Verb.ENTER:
             starts: list[Any] = [Start(Variable(*variable), value) for variable, value in data]
-            self._slave.enter_initialisation(starts, times[0])
+            self._slave.enter_initialisation(starts, times[0], times[2])
         elif verb == Verb.WRITE:
             self._slave.write(times[0])
         elif verb == Verb.READ_INITIAL:
@@ -95,7 +97,7 @@ class _Server:
         nothing = np.zeros(0)
         self._slave.connect(
             [
-                Outlet(end["kind"], _variables(end), end["outputs"], values)
+                Outlet(end["kind"], _variables(end), end["outputs"], values, end["needed"])
                 for end, values in zip(plan["outlets"], results, strict=True)
             ],
             [Inlet(end["kind"], _variables(end), nothing, nothing, nothing, nothing) for end in plan["inlets"]],

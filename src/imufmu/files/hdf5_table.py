@@ -17,11 +17,15 @@ from .atomic import atomic_write
 
 @dataclass(frozen=True)
 class Dataset:
-    """Numbers at a place in the file: names of its groups, then its own. unit: None where it is not known."""
+    """Numbers at a place in the file: names of its groups, then its own. unit: None where it is not known.
+
+    first_index: of its elements, where these have names.
+    """
 
     place: Sequence[str]
     values: np.ndarray
     unit: str | None
+    first_index: int = 1
 
 
 def write_hdf5(path: str | os.PathLike[str], attributes: Mapping[str, Any], datasets: Iterable[Dataset]) -> list[str]:
@@ -38,6 +42,8 @@ def write_hdf5(path: str | os.PathLike[str], attributes: Mapping[str, Any], data
             written = file.create_dataset("/".join(links), data=dataset.values, track_order=True)
             if dataset.unit is not None:
                 written.attrs["unit"] = dataset.unit
+            if dataset.first_index != 1:
+                written.attrs["first_index"] = dataset.first_index
             if links != list(dataset.place):
                 written.attrs["name"] = ".".join(dataset.place)
                 notes.append(f"{'.'.join(dataset.place)} is {'/'.join(links)} in {path}, as HDF5 has no such names")

@@ -64,7 +64,8 @@ def compare_all(result: Result) -> tuple[list[Comparison], list[str]]:
 def knowing(names: Iterable[str]) -> tuple[list[str], list[str]]:
     """Plants that tell the truth and estimators among the components with these variables, in their order."""
     known = list(names)
-    attitudes = [name.removesuffix(".vertical[1]") for name in known if name.endswith(".vertical[1]")]
+    endings = (".vertical[1]", ".vertical[0]")  # a vector from 0 has both
+    attitudes = list(dict.fromkeys(name[: -len(endings[0])] for name in known if name.endswith(endings)))
     estimators = [component for component in attitudes if f"{component}.sample_time" in known]
     return [component for component in attitudes if component not in estimators], estimators
 
@@ -110,4 +111,6 @@ def _signals(result: Result, component: str) -> dict[str, np.ndarray]:
 def _units(result: Result, component: str, signals: Iterable[str]) -> dict[str, str | None]:
     """Units of signals, those of vectors from their first element."""
     names = {name: f"{component}.{name}" for name in signals}
-    return {name: result.units.get(full, result.units.get(f"{full}[1]")) for name, full in names.items()}
+    return {
+        name: result.units.get(full, result.units.get(f"{full}[1]")) for name, full in names.items()
+    }  # [0] has it too
