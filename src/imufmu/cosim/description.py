@@ -19,7 +19,7 @@ OMSimulator and of the Open Simulation Platform are understood, too:
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -221,8 +221,7 @@ class _Flat:
             )
 
     def _bind(self, element: Any, name: str, files: Sources, component: Path | None, depth: int) -> None:
-        for value in bound_values(element, files, component):
-            self.values.append((depth, replace(value, name=_joined(name, value.name))))
+        self.values += [(depth, value) for value in bound_values(element, name, files, component)]
 
     def _component(
         self, element: Any, name: str, files: Sources, units: dict[str, Unit], dictionaries: Dictionaries, depth: int

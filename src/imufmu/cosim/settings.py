@@ -128,7 +128,7 @@ class Resolver:
         if len(texts) != len(names):
             raise ValueError(f"{len(texts)} values for {len(names)} elements")
         return [
-            self._setting(component, variables[name], replace(given, value=text))
+            self._setting(component, variables[name], given if text == given.value else replace(given, value=text))
             for name, text in zip(names, texts, strict=True)
         ]
 

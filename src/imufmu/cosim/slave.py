@@ -139,20 +139,22 @@ class Inputs:
     """The inputs of a component, gathered from the values of their sources into one buffer per inlet."""
 
     def __init__(self, inlets: Sequence[Inlet], buffers: Sequence[np.ndarray]) -> None:
-        as_they_are = [bool(np.all(inlet.factor == 1.0) and np.all(inlet.offset == 0.0)) for inlet in inlets]
-        self._each = list(zip(inlets, buffers, as_they_are, strict=True))
+        self._each = []
+        for inlet, buffer in zip(inlets, buffers, strict=True):
+            as_it_is = bool(np.all(inlet.factor == 1.0) and np.all(inlet.offset == 0.0))
+            self._each.append((inlet, buffer, inlet.pool.dtype == buffer.dtype, as_it_is, list(inlet.tables.items())))
 
     def gather(self) -> None:
         """Take the inputs from the present values of their sources."""
-        for inlet, buffer, as_it_is in self._each:
-            if inlet.pool.dtype == buffer.dtype:
+        for inlet, buffer, same_kind, as_it_is, tables in self._each:
+            if same_kind:
                 inlet.pool.take(inlet.sources, out=buffer, mode="clip")
             else:
                 buffer[:] = inlet.pool[inlet.sources]
             if not as_it_is:
                 buffer *= inlet.factor
                 buffer += inlet.offset
-            for i, table in inlet.tables.items():
+            for i, table in tables:
                 buffer[i] = table.get(int(buffer[i]), buffer[i])
 
 

@@ -45,33 +45,36 @@ class ParameterValue:
     items: tuple[tuple[str, int], ...] = ()
 
 
-def bound_values(element: Any, files: Sources, component: Path | None) -> tuple[ParameterValue, ...]:
-    """Values bound to a component or system by the names that they have there, later ones taking precedence.
+def bound_values(element: Any, name: str, files: Sources, component: Path | None) -> Iterator[ParameterValue]:
+    """Values bound to a component or system, later ones taking precedence.
 
-    component: the component's file.
+    name: of the component or system, which goes before the names of the values. component: the component's file.
     """
-    values: list[ParameterValue] = []
+    around = f"{name}." if name else ""
     for binding in element.iterfind("ssd:ParameterBindings/ssd:ParameterBinding", NAMESPACES):
         if binding.get("type", _SET) != _SET:
             raise DescriptionError(f"{files.where(binding)}: only parameter sets (.ssv) are supported")
         prefix = binding.get("prefix", "")
-        found = [replace(value, name=prefix + value.name) for value in _sets(binding, files, component)]
         mapping = binding.find("ssd:ParameterMapping", NAMESPACES)
-        values += found if mapping is None else _mapped(found, _mapping(mapping, files, component))
-    return tuple(values)
+        if mapping is None:
+            yield from _sets(binding, around + prefix, files, component)
+        else:
+            found = list(_sets(binding, prefix, files, component))
+            yield from _mapped(found, _mapping(mapping, files, component), around)
 
 
-def _sets(binding: Any, files: Sources, component: Path | None) -> Iterator[ParameterValue]:
+def _sets(binding: Any, prefix: str, files: Sources, component: Path | None) -> Iterator[ParameterValue]:
     if binding.get("source") is not None:
         content, path = files.content(binding, component)
-        yield from _values(read_root(content, path, "ParameterSet", files.faults), path, {}, files.faults)
+        root = read_root(content, path, "ParameterSet", files.faults)
+        yield from _values(root, prefix, path, {}, files.faults)
     for inline in binding.iterfind("ssd:ParameterValues/{*}ParameterSet", NAMESPACES):
         check_root(inline, files.ssd, "ParameterSet", files.faults)
         around = {} if inline.find("ssv:Units", NAMESPACES) is not None else units_in(inline.getroottree().getroot())
-        yield from _values(inline, files.ssd, around, files.faults)
+        yield from _values(inline, prefix, files.ssd, around, files.faults)
 
 
-def _values(root: Any, path: Path, units: dict[str, Unit], faults: list[str]) -> Iterator[ParameterValue]:
+def _values(root: Any, prefix: str, path: Path, units: dict[str, Unit], faults: list[str]) -> Iterator[ParameterValue]:
     units = units | units_in(root)
     enumerations = enumerations_in(root)
     for parameter in root.iterfind("ssv:Parameters/ssv:Parameter", NAMESPACES):
@@ -87,12 +90,14 @@ def _values(root: Any, path: Path, units: dict[str, Unit], faults: list[str]) ->
         items = enumerations.get(value.get("name", ""), {})
         unit = value.get("unit")
         known = None if not unit else units.get(unit, Unit(unit))
-        yield ParameterValue(name, etree.QName(value).localname, text, known, where, items=tuple(items.items()))
+        yield ParameterValue(
+            prefix + name, etree.QName(value).localname, text, known, where, items=tuple(items.items())
+        )
 
 
 def read_parameter_set(path: Path) -> list[ParameterValue]:
     """Values of an .ssv file. Raises DescriptionError and ArchiveError."""
-    return list(_values(read_root(read_bytes(path), path, "ParameterSet", []), path, {}, []))
+    return list(_values(read_root(read_bytes(path), path, "ParameterSet", []), "", path, {}, []))
 
 
 @dataclass(frozen=True)
@@ -129,13 +134,13 @@ def _mapping(element: Any, files: Sources, component: Path | None) -> list[_Entr
     ]
 
 
-def _mapped(values: list[ParameterValue], entries: list[_Entry]) -> list[ParameterValue]:
+def _mapped(values: list[ParameterValue], entries: list[_Entry], around: str) -> list[ParameterValue]:
     """Values under the names of their targets; those that no entry mentions are not applied."""
     by_name: dict[str, list[ParameterValue]] = {}
     for value in values:
         by_name.setdefault(value.name, []).append(value)
     return [
-        replace(value, name=entry.target, transformation=entry.transformation, same_units=entry.same_units)
+        replace(value, name=around + entry.target, transformation=entry.transformation, same_units=entry.same_units)
         for entry in entries
         for value in by_name.get(entry.source, [])
     ]
