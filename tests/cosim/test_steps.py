@@ -154,6 +154,17 @@ def test_a_truth_that_counts_from_0_is_compared() -> None:
     assert compared.summary["tilt_rmse_deg"] < 1e-12  # nothing but what keeps the norm differentiable
 
 
+def test_a_truth_in_degrees_is_compared_in_radians() -> None:
+    time = np.arange(4) * 0.25
+    columns = {f"{c}.vertical[{i + 1}]": np.full(4, float(i == 2)) for c in ("plant", "mine") for i in range(3)}
+    columns |= {"plant.yaw": np.full(4, 90.0), "mine.yaw": np.full(4, math.pi / 2), "mine.sample_time": time}
+    units: dict[str, str | None] = dict.fromkeys(columns, "1") | {"plant.yaw": "deg", "mine.yaw": "rad"}
+    units["mine.sample_time"] = "s"
+    (compared,) = imufmu.comparisons(Result("s", time, columns, units))
+    assert compared.truth.values["yaw"].tolist() == [math.pi / 2] * 4
+    assert np.abs(compared.errors["yaw"]).max() < 1e-12  # a rounding of pi / 2
+
+
 def test_equal_indices_of_vectors_from_0_and_from_1_are_noted_as_shifted(tmp_path: Path) -> None:
     plant = fake_fmu(tmp_path / "plant.fmu", vector("w", 0))
     imu = fake_fmu(tmp_path / "imu.fmu", vector("gyro", 1, "input"))

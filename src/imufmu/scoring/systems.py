@@ -14,9 +14,20 @@ import numpy as np
 
 from ..blocks.running import Trajectory
 from ..cosim.results import Result
+from ..cosim.units import SAME, Unit, UnitError, conversion
 from . import metrics
 
-_COMPARED = ("vertical", "roll", "pitch", "yaw", "q_NS", "external_acceleration", "sample_time", "tilt_std")
+# What is compared, each in this unit.
+_COMPARED = {
+    "vertical": "1",
+    "roll": "rad",
+    "pitch": "rad",
+    "yaw": "rad",
+    "q_NS": "1",
+    "external_acceleration": "m/s2",
+    "sample_time": "s",
+    "tilt_std": "rad",
+}
 
 
 @dataclass(frozen=True)
@@ -83,8 +94,8 @@ def _compare(result: Result, plant: str, component: str, notes: list[str]) -> Co
     time = result.time[rows]
     return Comparison(
         component,
-        Trajectory(time, true_then, _units(result, plant, true_then)),
-        Trajectory(time, at_samples, _units(result, component, at_samples)),
+        Trajectory(time, true_then, {name: _COMPARED[name] for name in true_then}),
+        Trajectory(time, at_samples, {name: _COMPARED[name] for name in at_samples}),
         errors,
         metrics.summary(errors),
         float(np.mean(result.time[rows_hat] - at_samples["sample_time"])),
@@ -105,7 +116,16 @@ def leave_out_unequal(
 
 
 def _signals(result: Result, component: str) -> dict[str, np.ndarray]:
-    return {name: result[f"{component}.{name}"] for name in _COMPARED if f"{component}.{name}" in result}
+    """What a component reports, in our units. Raises ValueError for a unit of another kind."""
+    signals = {name: result[f"{component}.{name}"] for name in _COMPARED if f"{component}.{name}" in result}
+    for name, unit in _units(result, component, signals).items():
+        try:
+            linear = conversion(None if unit in (None, "", "1") else Unit(unit), Unit(_COMPARED[name]))
+        except UnitError as error:
+            raise ValueError(f"{component}.{name}: {error}") from error
+        if linear != SAME:
+            signals[name] = linear.factor * signals[name] + linear.offset
+    return signals
 
 
 def _units(result: Result, component: str, signals: Iterable[str]) -> dict[str, str | None]:
