@@ -195,7 +195,7 @@ def test_list_info_and_run_answer_programs_in_json(imufmu: Command) -> None:
     assert told["platforms"] == ["linux64", "win64"] and told["default_step_s"] == 0.01
     assert variables["c_a"] | {"description": ""} == {
         "name": "c_a", "causality": "parameter", "variability": "tunable", "type": "Real", "unit": "1",
-        "start": 0.1, "min": 0.0, "max": 1.0, "description": "",
+        "start": 0.1, "min": 0.0, "max": 1.0, "description": "", "shape": [],
     }  # fmt: skip
     assert variables["use_initial_angles"]["start"] is False and variables["mode"]["start"] == 1
     code, text, _ = imufmu("run", "pendulum_lee2012", "--stop", 1, "--json", "--output", "r.csv")

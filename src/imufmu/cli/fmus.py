@@ -19,6 +19,10 @@ def build(
     names: Annotated[list[str], typer.Argument(help="Names of blocks (see: imufmu list), or: all")],
     folder: Annotated[Path, typer.Option("--folder", "-f", help="Where the FMUs go.")] = Path(),
     native: Annotated[bool, typer.Option("--native", help="Compiled C, which needs no Python where it runs.")] = False,
+    imu: Annotated[
+        str | None,
+        typer.Option("--imu", help="With --native: bake this device (see: imufmu list), or an .ssv file, into imu."),
+    ] = None,
     platforms: Annotated[
         list[str] | None,
         typer.Option(
@@ -34,19 +38,24 @@ def build(
       imufmu build lee2012 --native
       imufmu build lee2012 --native --platform all        needs: pip install "imufmu[native]"
       imufmu build imu+lee2012 --native                   both in series, as one FMU
+      imufmu build imu+plumb --native --imu mpu9150       its IMU with the errors and the rate of that device
     """
     from ..compiled.compilers import PLATFORMS
+    from ..cosim.devices import device_values
     from ..fmi.build import build_fmu
     from ..fmi.native import build_native
     from ..registry import BLOCKS
 
     if platforms and not native:
         raise typer.BadParameter("give it together with --native", param_hint="--platform")
+    if imu and not native:
+        raise typer.BadParameter("give it together with --native", param_hint="--imu")
     check_folder(folder)
+    device = {name: value.number for name, value in device_values(imu).items()} if imu else None
     for name in BLOCKS if names == ["all"] else names:
         if native:
             with progress_bar(f"compiling {name}") as progress:
-                path = build_native(name, folder, [*PLATFORMS] if platforms == ["all"] else platforms, progress)
+                path = build_native(name, folder, [*PLATFORMS] if platforms == ["all"] else platforms, progress, device)
         else:
             path = build_fmu(name, folder)
         out.print(str(path))

@@ -13,6 +13,7 @@ import typer
 from .. import __version__
 from ..cosim.errors import SimulationError
 from ..cosim.interrupt import clean_up_when_asked_to_end
+from .connecting import connect
 from .console import err, out, show_what_can_be_shown
 from .fmus import build, doctor, info
 from .listing import list_
@@ -31,6 +32,7 @@ EXAMPLES = """IMU attitude estimators as drop-in FMUs, with the plants and IMU m
   imufmu doctor lee2012.fmu                     whether and where it runs
   imufmu run pendulum_lee2012 --set lee2012.mode=3 --plot
   imufmu run pendulum_swing_up --report swing_up.html --animate swing_up.gif
+  imufmu connect plant.fmu --out my.ssd         wires your own plant to an IMU and estimators
   imufmu replay walk.csv --estimator lee2012 --set c_a=0.2 --output tilt.csv
   imufmu pack pendulum_lee2012 pendulum.ssp     for other tools
   imufmu validate --junit verdict.xml           do the papers' conclusions hold?
@@ -59,7 +61,7 @@ def _root(version: Annotated[bool, typer.Option("--version", help="Print the ver
 
 
 app.command("list")(list_)
-for verb in (build, doctor, info, run, replay, pack, demo, validate, benchmark, speed, predict):
+for verb in (build, doctor, info, run, connect, replay, pack, demo, validate, benchmark, speed, predict):
     app.command()(verb)
 
 

@@ -9,6 +9,7 @@ import typer
 
 from ..cosim.errors import STEP_TIMEOUT
 from .arguments import check_folder, check_target, parsed_pairs, parsed_sets
+from .connecting import Estimators, Maps, Rate, asker, check_system_or_plant, parsed_maps
 from .console import Json, notes, out, print_json, print_table, progress_bar, written
 from .saving import kept, save
 
@@ -33,7 +34,17 @@ Plot = Annotated[bool, typer.Option("--plot", help="Write a figure next to the w
 
 
 def run(
-    system: Annotated[str, typer.Argument(help="Name of a system (see: imufmu list), or an .ssd or .ssp file")],
+    system: Annotated[
+        str | None, typer.Argument(help="Name of a system (see: imufmu list), or an .ssd or .ssp file")
+    ] = None,
+    plant: Annotated[Path | None, typer.Option("--plant", help="Your own plant, an .fmu file, for SYSTEM.")] = None,
+    imu: Annotated[
+        str | None,
+        typer.Option("--imu", help="Device (see: imufmu list), or an .ssv file. With --plant: mtx."),
+    ] = None,
+    estimators: Estimators = None,
+    maps: Maps = None,
+    rate: Rate = None,
     sets: Sets = None,
     stop: Annotated[float | None, typer.Option("--stop", help="Stop time (s).")] = None,
     step: Annotated[float | None, typer.Option("--step", help="Communication step (s).")] = None,
@@ -65,31 +76,46 @@ def run(
       imufmu run pendulum_swing_up --report swing_up.html --animate swing_up.gif
       imufmu run my_system.ssd --stop 60 --step 0.005 --output run.csv
       imufmu run pendulum_lee2012 --set "imu.gyro_noise_density=0.005 deg/s/sqrt(Hz)"
+      imufmu run pendulum_lee2012 --imu mpu9150 --rate 200
+      imufmu run --plant my.fmu --imu mpu9150 --estimator plumb --estimator lee2012
+      imufmu run --plant my.fmu --map gyro=omega:deg/s --map quaternion=q:wxyz:to-world
       imufmu run pendulum_lee2012 --json
 
+    --plant wires the FMU as imufmu connect does, which tells more of it. --rate sets the step and every sample period.
     The heading counts from East: an estimator without a magnetometer keeps what it does not know at the start.
     With --report or --animate the results also hold the points of the body, where the plant has the local variable
     skeleton. An FMU that imufmu has not built runs in a process of its own: if it crashes or hangs, the run ends, and
     the rows up to there are written, marked as partial.
     """
+    from ..cosim.devices import device_parameters, rate_parameters
     from ..cosim.master import simulate
     from ..cosim.system import System
     from ..pictures.bodies import recorded
     from ..reports.present import animate, check_pictures, present_run
     from ..reports.tables import run_facts
 
-    check_target(output, ".csv", ".h5", inputs=[system])
+    given = check_system_or_plant(system, plant, estimators, maps)
+    check_target(output, ".csv", ".h5", inputs=[given])
     check_target(report, ".html")
     check_target(animation, ".gif", ".mp4")
-    with progress_bar(f"preparing {system}"):  # builds our FMUs, which can take minutes with --native
-        read = System.read(system, native=native, strict=strict)
+    if plant:
+        device = imu or "mtx"
+        read = System.connect(
+            plant, device, estimators or ["plumb"], parsed_maps(maps), rate=rate, native=native, ask=asker()
+        )
+        changes: dict[str, object] = {}
+    else:
+        with progress_bar(f"preparing {system}"):  # builds our FMUs, which can take minutes with --native
+            read = System.read(given, native=native, strict=strict)
+        changes = device_parameters(read.interfaces, imu) if imu else {}
+    changes |= rate_parameters(read.interfaces, rate) if rate else {}
     check_pictures(read, plot, report, animation)
     with kept(output), progress_bar(f"running {read.description.name}") as progress:
         result = simulate(
             read,
             stop_time=stop,
-            step=step,
-            parameters=parsed_sets(sets),
+            step=1.0 / rate if rate and step is None else step,
+            parameters=changes | parsed_sets(sets),
             record=recorded(read) if report or animation else None,
             jacobi=jacobi,
             treat=parsed_pairs(treat, "--treat", "plant=continuous"),

@@ -11,7 +11,8 @@ from ..files.scratch import scratch_folder
 from ..fmi.archive import interface_of, open_fmu
 from .guest import Guest
 from .kinds import slave_of
-from .slave import Equations, Slave, Unpacked, forget_paths
+from .slave import Slave, forget_paths
+from .unpacked import Equations, Unpacked
 
 Instance = Slave | Guest
 

@@ -39,6 +39,7 @@ from .ssp.files import (
 from .ssp.parameters import ParameterValue, bound_values
 from .ssp.signals import Dictionaries
 from .ssp.transformations import Transformation, transformation_of
+from .truth import Told, read_truth
 from .units import Unit
 
 FMU_TYPE = "application/x-fmu-sharedlibrary"
@@ -124,6 +125,7 @@ class Description:
     stop_time: float | None
     step: float | None
     faults: tuple[str, ...] = ()
+    truth: tuple[Told, ...] = ()  # what the plant tells of its attitude, where that is not in our words
 
 
 def read_description(path: Path, inside: Path | None = None) -> Description:
@@ -152,7 +154,15 @@ def read_description(path: Path, inside: Path | None = None) -> Description:
         stop_time=stop,
         step=_step(root, path),
         faults=tuple(faults),
+        truth=_truth(root, path),
     )
+
+
+def _truth(root: Any, path: Path) -> tuple[Told, ...]:
+    try:
+        return read_truth(root)
+    except ValueError as error:
+        raise DescriptionError(f"{path}, {error}") from None
 
 
 def _system_of(root: Any, path: Path) -> Any:

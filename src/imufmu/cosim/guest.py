@@ -15,7 +15,8 @@ import numpy as np
 from ..fmi.child import Child
 from .errors import EndOfRun, SimulationError
 from .settings import Setting
-from .slave import CALLS, STEPS, Inlet, Inputs, Outlet, Unpacked, Variable, quoted, when
+from .slave import CALLS, STEPS, Inlet, Inputs, Outlet, quoted, when
+from .unpacked import Unpacked, Variable
 from .wire import Answer, Numbers, Shared, Verb, receive_answer, send_command
 
 _START_TIMEOUT = 60.0  # s, of Python itself, however short the user's patience with the FMU

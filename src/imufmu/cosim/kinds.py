@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from .slave import Slave, Unpacked
+from .slave import Slave
+from .unpacked import Unpacked
 
 
 def slave_of(name: str, fmu: Unpacked, now: Any = None, say: Callable[[str], None] | None = None) -> Slave:

@@ -31,6 +31,7 @@ from .results import Result
 from .schedule import Schedule
 from .settings import Setting
 from .system import Part, System, locate
+from .truth import derive
 
 MOST_TICKS = 10**8  # more is taken for a wrong unit
 _BETWEEN_PROGRESS = 0.1  # s
@@ -91,13 +92,19 @@ def simulate(
         system = System.read(locate(system), native=native)
     settings = system.settings_with(parameters or {})
     ticks = _ticks(system, start_time, stop_time, step)
-    exchange = Exchange(system, record)
+    told = system.description.truth
+    exchange = Exchange(
+        system, record if record is None or not told else [*record, *(v for t in told for v in t.variables)]
+    )
     schedule = Schedule(system, jacobi, treat or {})
     notes = [*system.notes, *_period_notes(system, settings, ticks.h), *schedule.notes]
 
     def result(partial: str = "") -> Result:
         time = ticks.start + np.arange(exchange.rows) * ticks.h
-        return Result(system.description.name, time, exchange.columns(), exchange.units(), tuple(notes), partial)
+        columns, units = exchange.columns(), exchange.units()
+        derived, their_units, said = derive(told, columns)
+        every = columns | derived, units | their_units, (*notes, *said)
+        return Result(system.description.name, time, *every, partial)
 
     try:
         with ExitStack() as stack:

@@ -15,7 +15,7 @@ from ctypes import POINTER, byref, c_char_p, c_double, c_int, c_uint
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from fmpy.fmi1 import FMICallException
@@ -23,6 +23,7 @@ from fmpy.fmi2 import FMU2Slave, fmi2Discard, fmi2Fatal, fmi2OK, fmi2True, fmi2W
 
 from .errors import EndOfRun, SimulationError
 from .messages import Messages
+from .unpacked import Unpacked
 
 if TYPE_CHECKING:
     from .settings import Setting
@@ -63,46 +64,6 @@ STEPS = (INTEGRATION, "fmi2DoStep", "fmi3DoStep")
 
 _TERMINATED = 3  # fmi2Terminated of fmi2StatusKind
 Call = tuple[int, Callable[[], int]]  # number of an FMI function, and a call of it
-
-
-class Equations(NamedTuple):
-    """What it takes to solve an FMU for model exchange. told_of_steps: it wants to know of every step of the solver."""
-
-    states: int
-    indicators: int
-    tolerance: float
-    told_of_steps: bool
-
-
-@dataclass(frozen=True)
-class Unpacked:
-    """An FMU on disk: its shared library, the folder it is unpacked in, its GUID and modelIdentifier.
-
-    version: 2 or 3, of FMI. equations: of an FMU for model exchange; None for one for co-simulation.
-    """
-
-    library: Path
-    folder: Path
-    guid: str
-    identifier: str
-    version: int = 2
-    equations: Equations | None = None
-
-
-class Variable(NamedTuple):
-    """What a slave needs to know of a variable. wire: its type in FMI 3.0. place, size: which element of an array."""
-
-    name: str
-    valueReference: int
-    wire: str = ""
-    place: int = 0
-    size: int = 1
-
-    @staticmethod
-    def of(variable: Any) -> Variable:
-        """Of a ModelVariable (fmpy), or one element of it."""
-        element = [getattr(variable, name) for name in ("wire", "place", "size") if hasattr(variable, name)]
-        return Variable(variable.name, variable.valueReference, *element)
 
 
 @dataclass(frozen=True)

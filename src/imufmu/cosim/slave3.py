@@ -12,7 +12,8 @@ import numpy as np
 from fmpy.fmi3 import FMU3Slave
 
 from .errors import EndOfRun, SimulationError
-from .slave import CALLS, DTYPES, GOOD, KINDS, WIRES, Call, Slave, Unpacked, references, when
+from .slave import CALLS, DTYPES, GOOD, KINDS, WIRES, Call, Slave, references, when
+from .unpacked import Unpacked
 
 if TYPE_CHECKING:
     from .settings import Setting

@@ -14,8 +14,9 @@ from fmpy.fmi2 import FMU2Model
 from fmpy.fmi3 import FMU3Model
 
 from .errors import EndOfRun, SimulationError
-from .slave import CALLS, INTEGRATION, Equations, Slave, Unpacked, quoted, when
+from .slave import CALLS, INTEGRATION, Slave, quoted, when
 from .slave3 import Slave3
+from .unpacked import Equations, Unpacked
 
 _MOST_EVENTS = 10_000  # in one step; more do not come to an end
 _SAME_TIME = 1e-9  # of a step
@@ -89,7 +90,6 @@ class _Solver:
         self._update = getattr(fmu, "updateDiscreteStates", None) or fmu.newDiscreteStates
         self._fault: Exception | None = None
         self._next: float | None = None
-        fmu.setTime(time)
         self._iterate()
         fmu.enterContinuousTimeMode()
         derivatives = getattr(fmu, "getContinuousStateDerivatives", None) or fmu.getDerivatives

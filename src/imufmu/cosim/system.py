@@ -19,6 +19,8 @@ from ..fmi.build import cached_fmu
 from ..fmi.native import cached_native_fmu
 from ..fmi.own import is_ours
 from ..registry import BLOCKS
+from .connecting.connect import connect
+from .connecting.matching import Ask
 from .description import Component, Description, DescriptionError, read_description
 from .interface import Interface, WiringError
 from .links import Link, Wiring
@@ -83,6 +85,33 @@ class System:
         system = replace(system, path=path, notes=tuple(map(shown, system.notes)))
         weakref.finalize(system, delete)
         return system
+
+    @staticmethod
+    def connect(
+        plant: str | Path,
+        imu: str | Path = "mtx",
+        estimators: Sequence[str | Path] = ("plumb",),
+        mapping: Mapping[str, str] | None = None,
+        *,
+        rate: float | None = None,
+        stop_time: float | None = None,
+        native: bool = False,
+        ask: Ask | None = None,
+    ) -> System:
+        """A plant of others with an IMU and estimators, wired by names and units; see ``connect.connect``.
+
+        What was found is in ``notes``. To keep the description: ``imufmu connect``. Raises WiringError with everything
+        that is unclear, and what ``System.read`` raises.
+        """
+        connected = connect(plant, imu, estimators, mapping, rate=rate, stop_time=stop_time, ask=ask)
+        folder, delete = new_scratch("connect")
+        try:
+            path = folder / f"{connected.name}.ssd"
+            path.write_bytes(connected.text(folder))
+            system = _read(path, native, strict=False)
+        finally:
+            delete()
+        return replace(system, notes=(*connected.lines, *system.notes))
 
     @property
     def interfaces(self) -> Mapping[str, Interface]:

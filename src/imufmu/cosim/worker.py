@@ -21,7 +21,8 @@ import numpy as np
 
 from .errors import EndOfRun, SimulationError
 from .kinds import slave_of
-from .slave import Equations, Inlet, Outlet, Slave, Unpacked, Variable
+from .slave import Inlet, Outlet, Slave
+from .unpacked import Equations, Unpacked, Variable
 from .wire import Answer, Numbers, Shared, Verb, receive_command, send_answer
 
 

@@ -8,15 +8,16 @@ from __future__ import annotations
 import hashlib
 import os
 import shutil
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
+from dataclasses import replace
 from pathlib import Path
 from xml.etree.ElementTree import indent, tostring
 
 from platformdirs import user_cache_path
 
 from .. import __version__
-from ..blocks.block import Block
+from ..blocks.block import Block, SampledBlock
 from ..blocks.series import series
 from ..blocks.signals import DeclarationError
 from ..compiled.compilers import (
@@ -49,15 +50,19 @@ def build_native(
     folder: Path,
     platforms: Sequence[str] | None = None,
     progress: Callable[[int, int], None] | None = None,
+    imu: Mapping[str, float] | None = None,
 ) -> Path:
     """Write the native FMU of a block and return its path in ``folder``: name.fmu.
 
     name: of a registered block, or of several in series, as imu+lee2012, which makes imu_lee2012.fmu. platforms: names
     from PLATFORMS, compiled in parallel; by default the platform at hand. progress: called with the number of binaries
-    that are ready and that of all. Raises BuildError for an unknown name or platform, blocks that do not fit together,
-    a compiler that is missing or fails, or a folder that cannot be written.
+    that are ready and that of all. imu: start values of parameters of the block imu, such as ``gyro_bias[1]``, in place
+    of its own, and the sample period of all.
+
+    Raises BuildError for an unknown name or platform, blocks that do not fit together, no IMU among them where ``imu``
+    is given, a compiler that is missing or fails, or a folder that cannot be written.
     """
-    block = block_called(name)
+    block = with_imu(block_called(name), imu) if imu else block_called(name)
     wanted = [_platform(given) for given in dict.fromkeys(platforms or [own_platform()])]
     target = folder / f"{block.name}.fmu"
     try:
@@ -98,6 +103,23 @@ def block_called(name: str) -> Block:
         return BLOCKS[name] if len(parts) == 1 else series(*(BLOCKS[part] for part in parts))
     except DeclarationError as error:
         raise BuildError(str(error)) from error
+
+
+def with_imu(block: Block, values: Mapping[str, float]) -> Block:
+    """The block with other start values of the parameters of its IMU. Raises BuildError."""
+    if not isinstance(block, SampledBlock) or not (block.name == "imu" or "imu" in block.name.split("_")):
+        raise BuildError(f"{block.name} has no IMU in it; as in imu+lee2012")
+    left = dict(values)
+    period = left.pop("sample_period", block.period)
+    parameters = []
+    for parameter in block.own_parameters:
+        elements = replace(parameter, name=parameter.name.removeprefix("imu.")).element_names()
+        starts = zip(elements, parameter.start_values(), strict=True)
+        new = tuple(float(left.pop(element, start)) for element, start in starts)
+        parameters.append(replace(parameter, start=new if parameter.shape else new[0]))
+    if left:
+        raise BuildError(f"{block.name}: its IMU has no parameter {', '.join(left)}")
+    return replace(block, own_parameters=tuple(parameters), period=period)
 
 
 def sources(block: Block) -> dict[str, bytes]:

@@ -9,6 +9,7 @@ from ..blocks.running import Trajectory
 from ..cosim.replay import Replay
 from ..cosim.results import Result
 from ..cosim.system import System
+from ..cosim.truth import derived_names
 from ..pictures import animation
 from ..pictures.bodies import body_of
 from ..pictures.figures import attitude_figure, save
@@ -25,6 +26,7 @@ def check_pictures(system: System, figure: bool, report: Path | None, movie: Pat
     if not (figure or report or movie):
         return
     names = [f"{name}.{variable}" for name, found in system.interfaces.items() for variable in found.variables]
+    names += derived_names(system.description.truth)
     plants, estimators = knowing(names)
     for found, what in (
         (plants, "no plant that knows the truth (outputs vertical[1..3], and no sample_time)"),

@@ -14,6 +14,7 @@ import numpy as np
 
 from ..blocks.running import Trajectory
 from ..cosim.results import Result
+from ..cosim.truth import COMPONENT as TRUTH
 from ..cosim.units import SAME, Unit, UnitError, conversion
 from . import metrics
 
@@ -73,12 +74,16 @@ def compare_all(result: Result) -> tuple[list[Comparison], list[str]]:
 
 
 def knowing(names: Iterable[str]) -> tuple[list[str], list[str]]:
-    """Plants that tell the truth and estimators among the components with these variables, in their order."""
+    """Plants that tell the truth and estimators among the components with these variables, in their order.
+
+    A truth that follows from what a plant says in words of its own is the only one.
+    """
     known = list(names)
     endings = (".vertical[1]", ".vertical[0]")  # a vector from 0 has both
     attitudes = list(dict.fromkeys(name[: -len(endings[0])] for name in known if name.endswith(endings)))
     estimators = [component for component in attitudes if f"{component}.sample_time" in known]
-    return [component for component in attitudes if component not in estimators], estimators
+    plants = [component for component in attitudes if component not in estimators]
+    return [TRUTH] if TRUTH in plants else plants, estimators
 
 
 def _compare(result: Result, plant: str, component: str, notes: list[str]) -> Comparison:
