@@ -266,3 +266,12 @@ def test_a_description_in_another_folder_finds_its_plant(tmp_path: Path) -> None
     path.write_bytes(connect(fmu).text(path.parent))
     assert read_description(path).components[0].source == fmu.resolve()
     assert str(tmp_path) not in path.read_text()  # the folders can be moved together
+
+
+def test_a_packed_system_has_the_truth_with_it(tmp_path: Path) -> None:
+    path = tmp_path / "my.ssd"
+    path.write_bytes(connect(rocker("3_cs"), "ideal", mapping={"matrix": "dcm:to-body"}).text(tmp_path))
+    imufmu.pack(path, tmp_path / "my.ssp")
+    packed, plain = (imufmu.simulate(tmp_path / name, stop_time=1.0, in_process=True) for name in ("my.ssp", "my.ssd"))
+    np.testing.assert_array_equal(packed["truth.q_NS"], plain["truth.q_NS"])
+    assert packed.units["truth.yaw"] == "rad"

@@ -10,6 +10,7 @@ import pytest
 
 import imufmu
 from imufmu import ArchiveError, Result, SimulationError, WiringError
+from imufmu.files.csv_table import write_csv
 from imufmu.fmi.archive import read_fmu
 from support.cosim_stubs import stub, write_ssd, write_zip
 from support.rocker import KINDS, rocker
@@ -98,6 +99,57 @@ def test_an_error_in_the_equations_is_told_with_call_and_time(kind: str, in_proc
     call = "fmi2GetDerivatives" if kind == "2_me" else "fmi3GetContinuousStateDerivatives"
     with pytest.raises(SimulationError, match=rf"^plant: {call} failed with status 3 \(error\) at t = 0 s"):
         rocked(kind, tmp_path, in_process=in_process, stiffness=99.0)
+
+
+@pytest.mark.parametrize(
+    ("stiffness", "fate"), [(98.0, r"crashed its process \(SIGABRT\)"), (97.0, "gave no answer within 1 s")]
+)
+@pytest.mark.parametrize("kind", EQUATIONS)
+def test_equations_that_crash_or_hang_take_their_own_process(
+    kind: str, stiffness: float, fate: str, tmp_path: Path
+) -> None:
+    system = write_ssd(tmp_path / "rocker.ssd", {"plant": rocker(kind)}, step=H)
+    with pytest.raises(SimulationError, match=rf"^plant: integration of its equations {fate} at t = 0 s, step 0\.01 s"):
+        imufmu.simulate(system, stop_time=2.0, parameters={"plant.stiffness": stiffness}, step_timeout=1.0)
+
+
+@pytest.mark.parametrize("kind", EQUATIONS)
+def test_equations_are_solved_as_well_at_any_epoch(kind: str, tmp_path: Path) -> None:
+    """Today's time in seconds has a resolution of 2.4e-7 s, of which the solver must see nothing."""
+    system = write_ssd(tmp_path / "rocker.ssd", {"plant": rocker(kind)}, step=H)
+    at_0, today = (
+        imufmu.simulate(system, start_time=start, stop_time=start + 2.0, record=["plant.angle"], in_process=True)
+        for start in (0.0, 1.7e9)
+    )
+    np.testing.assert_array_equal(at_0["plant.angle"], today["plant.angle"])
+
+
+def test_a_step_that_comes_back_early_is_no_step(tmp_path: Path) -> None:
+    with pytest.raises(
+        SimulationError, match=r"^plant: fmi3DoStep came back early at t = 0 s, step 0\.01 s, at t = 0\.01"
+    ):
+        rocked("3_cs", tmp_path, stiffness=96.0)
+
+
+def test_an_estimator_of_fmi_3_takes_a_recording(tmp_path: Path) -> None:
+    """Its arrays gyro and accel are fed; here by a platform whose outputs are renamed to inputs."""
+    path = changed(
+        tmp_path,
+        *(
+            (
+                f'name="{old}" valueReference="{ref}" causality="output" variability="continuous"',
+                f'name="{new}" valueReference="{ref}" causality="input" variability="continuous" start="0 0 0"',
+            )
+            for old, ref, new in (("angular_velocity", 12, "gyro"), ("specific_force", 15, "accel"))
+        ),
+        *((f'<Output valueReference="{ref}"/>', "") for ref in (12, 15)),
+        *((f'<InitialUnknown valueReference="{ref}"/>', "") for ref in (12, 15)),
+    )
+    time = np.arange(50) * H
+    write_csv(tmp_path / "walk.csv", {"time": time, "gyro": np.zeros((50, 3)), "accel": np.tile([0, 0, 9.8], (50, 1))})
+    replayed = imufmu.replay(imufmu.read_recording(tmp_path / "walk.csv"), path, in_process=True)
+    expected = np.sin(0.5 * np.cos(W * (time + H)))  # it is at the end of each step
+    np.testing.assert_allclose(replayed.columns["vertical[2]"], expected, atol=CLOSE["3_cs"])
 
 
 @pytest.mark.parametrize("in_process", [True, False], ids=["here", "apart"])

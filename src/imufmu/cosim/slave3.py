@@ -44,6 +44,11 @@ class Slave3(Slave):
     def _step(self, time: float, h: float) -> None:
         self._now.value = _DO_STEP
         self._judge(self._do_step(self._instance, time, h, True), time, h)
+        if self._early.value:
+            raise SimulationError(
+                f"{self.name}: fmi3DoStep came back early at {when(time, h)}, at {when(self._reached.value)}, as it "
+                "must not"
+            )
         if self._ended.value:
             raise EndOfRun(f"{self.name} ended the run at {when(time, h)}{self._last_words()}")
 

@@ -78,15 +78,20 @@ class Solved3(_Solved, Slave3):
 
 
 class _Solver:
-    """The equations of an instance in continuous-time mode. Raises what fmpy raises, and RuntimeError."""
+    """The equations of an instance in continuous-time mode. Raises what fmpy raises, and RuntimeError.
 
-    def __init__(self, fmu: Any, equations: Equations, time: float) -> None:
+    Its time counts from the start, in whole steps, so that equations are solved as well at 1.7e9 s as at 0.
+    """
+
+    def __init__(self, fmu: Any, equations: Equations, start: float) -> None:
         try:
             from fmpy.sundials import CVodeSolver
         except OSError as error:
             raise RuntimeError("FMPy brings no solver for this platform, which model exchange needs") from error
 
-        self._fmu, self._equations, self._time = fmu, equations, time
+        self._fmu, self._equations, self._start = fmu, equations, start
+        self._time = self._origin = 0.0
+        self._h, self._steps = 0.0, 0  # of equal length since the origin
         self._update = getattr(fmu, "updateDiscreteStates", None) or fmu.newDiscreteStates
         self._fault: Exception | None = None
         self._next: float | None = None
@@ -98,13 +103,16 @@ class _Solver:
             equations.indicators,
             *map(self._kept, (fmu.getContinuousStates, fmu.setContinuousStates, derivatives, fmu.getEventIndicators)),
             self._kept(fmu.getNominalsOfContinuousStates),
-            self._kept(fmu.setTime),
+            self._kept(self._set_time),
             self,
-            time,
+            0.0,
             relativeTolerance=equations.tolerance,
             maxNumSteps=100_000,
         )
         self._check()
+
+    def _set_time(self, since_start: float) -> None:
+        self._fmu.setTime(self._start + since_start)
 
     def apply(self, time: float) -> None:
         """As an input of fmpy: nothing to be done, inputs are held."""
@@ -120,7 +128,10 @@ class _Solver:
 
     def advance(self, h: float) -> None:
         """Solve over h (s), stopping at events."""
-        end, near = self._time + h, _SAME_TIME * h
+        if h != self._h:
+            self._origin, self._steps, self._h = self._time, 0, h
+        self._steps += 1
+        end, near = self._origin + self._steps * h, _SAME_TIME * h
         for _ in range(_MOST_EVENTS):
             if self._next is not None and self._next <= self._time + near:
                 self.event()
@@ -128,7 +139,7 @@ class _Solver:
             goal = end if self._next is None or self._next > end - near else self._next
             crossed, _, self._time = self._cvode.step(self._time, goal)
             self._check()
-            self._fmu.setTime(self._time)
+            self._set_time(self._time)
             asked = False
             if self._equations.told_of_steps:
                 asked, ended = self._fmu.completedIntegratorStep()
@@ -147,7 +158,7 @@ class _Solver:
             again, ended, _, _, defined, following = self._update()
             self._refuse_end(ended)
             if not again:
-                self._next = following if defined else None
+                self._next = following - self._start if defined else None
                 return
         raise RuntimeError(f"its discrete states do not settle in {_MOST_EVENTS} iterations")
 
