@@ -77,7 +77,7 @@ def test_links_special_files_and_repeated_names_are_refused(tmp_path: Path) -> N
     with zipfile.ZipFile(tmp_path / "b.ssp", "w") as writer, pytest.warns(UserWarning, match="Duplicate"):
         writer.writestr("same", "one")
         writer.writestr("same", "two")
-    assert "twice" in refusal(tmp_path / "b.ssp", tmp_path / "target")
+    assert "twice, with different contents" in refusal(tmp_path / "b.ssp", tmp_path / "target")
 
 
 def test_an_encrypted_member_is_refused(tmp_path: Path) -> None:
@@ -268,6 +268,7 @@ def test_an_fmu_that_cannot_run_here_is_refused_with_the_reason(
 @pytest.mark.parametrize(("prefix", "folders", "told"), [
     ("./", (), "begins with ./"),
     ("", ("documentation/", "documentation/"), "'documentation/' occurs twice"),
+    ("", ("extra/same.xml", "extra/same.xml"), "'extra/same.xml' occurs twice"),
     ("", ("documentation/Modelica::Blocks.html",), "has a colon in its name"),
 ])  # fmt: skip
 def test_odd_names_of_members_are_read_and_told(

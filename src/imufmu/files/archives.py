@@ -12,6 +12,7 @@ import struct
 import xml.parsers.expat
 import zipfile
 import zlib
+from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -127,14 +128,14 @@ def _opened(path: Path) -> Iterator[zipfile.ZipFile]:
         members = archive.infolist()
         if len(members) > MOST_MEMBERS:
             raise ArchiveError(f"{path}: {len(members)} members; at most {MOST_MEMBERS} are accepted")
-        seen: set[str] = set()
+        seen: dict[str, tuple[int, int]] = {}
         for member in members:
             harm = _why_harmful(member)
-            if _plain(member.filename) in seen and not member.is_dir():
-                harm = "the name occurs twice"
+            content = member.CRC, member.file_size
+            if seen.setdefault(_plain(member.filename), content) != content and not member.is_dir():
+                harm = "the name occurs twice, with different contents"
             if harm:
                 raise ArchiveError(f"{path}: member {member.orig_filename!r} refused: {harm}")
-            seen.add(_plain(member.filename))
         unpacked = sum(member.file_size for member in members)
         limit = min(LARGEST_UNPACKED, max(UNSUSPICIOUS, LARGEST_RATIO * path.stat().st_size))
         if unpacked > limit:
@@ -148,11 +149,10 @@ def _plain(name: str) -> str:
 
 def _oddities(names: Sequence[str]) -> list[str]:
     """What other programs may refuse in the names of members."""
-    folders = [name for name in names if name.endswith("/")]
     oddities = {
         "begins with ./": [name for name in names if name.startswith("./")],
         "has a colon in its name, which Windows has not": [name for name in names if ":" in name],
-        "occurs twice": [name for name in dict.fromkeys(folders) if folders.count(name) > 1],
+        "occurs twice": [name for name, count in Counter(names).items() if count > 1],
     }
     return [f"member {found[0]!r} {fault}" for fault, found in oddities.items() if found]
 
