@@ -9,10 +9,11 @@ import numpy as np
 import pytest
 
 import imufmu
-from imufmu import System, WiringError
+from imufmu import Result, System, WiringError
 from imufmu.cosim.connecting.connect import connect
 from imufmu.cosim.connecting.vectors import vectors
 from imufmu.cosim.description import read_description
+from imufmu.scoring.systems import compare_all
 from support.cosim_stubs import fake_fmu, variable
 from support.rocker import KINDS, rocker
 
@@ -275,3 +276,14 @@ def test_a_packed_system_has_the_truth_with_it(tmp_path: Path) -> None:
     packed, plain = (imufmu.simulate(tmp_path / name, stop_time=1.0, in_process=True) for name in ("my.ssp", "my.ssd"))
     np.testing.assert_array_equal(packed["truth.q_NS"], plain["truth.q_NS"])
     assert packed.units["truth.yaw"] == "rad"
+
+
+def test_an_estimator_that_does_not_tell_its_instants_is_named_and_not_taken_for_the_truth(
+    rng: np.random.Generator,
+) -> None:
+    vertical = rng.uniform(0.1, 1.0, (3, 4))
+    columns = {f"{c}.vertical[{i + 1}]": vertical[i] for c in ("truth", "plant", "mine", "plumb") for i in range(3)}
+    columns["plumb.sample_time"] = np.arange(4.0)
+    found, notes = compare_all(Result("s", np.arange(4.0), columns, dict.fromkeys(columns)))
+    assert [one.component for one in found] == ["plumb"]
+    assert notes == ["mine is not compared: it has no output sample_time, as an estimator needs"]

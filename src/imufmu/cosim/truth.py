@@ -23,6 +23,7 @@ import numpy as np
 from ..blocks.columns import element_names
 
 COMPONENT = "truth"
+PLANT = "plant"  # the component that tells it, where connect has named it
 ORDERS = ("wxyz", "xyzw")
 DIRECTIONS = ("to-world", "to-body")  # of what a quaternion or matrix does to components of a vector
 NAMESPACE = "urn:imufmu:ssp"

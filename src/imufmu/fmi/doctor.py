@@ -174,7 +174,7 @@ def _python_packages(path: Path) -> Finding:
 def _here(path: Path) -> Finding:
     """Whether imufmu runs it, as a plant or anything else in a system."""
     try:
-        model = read_fmu(path)
+        model = read_fmu(path, [])  # what is formally wrong is told above
     except ArchiveError as error:
         return Finding(Level.NOTE, "imufmu", f"does not run it: {str(error).removeprefix(f'{path}: ')}")
     solver = "" if model.coSimulation else ", its equations solved by CVode of FMPy"

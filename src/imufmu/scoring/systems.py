@@ -15,6 +15,7 @@ import numpy as np
 from ..blocks.running import Trajectory
 from ..cosim.results import Result
 from ..cosim.truth import COMPONENT as TRUTH
+from ..cosim.truth import PLANT
 from ..cosim.units import SAME, Unit, UnitError, conversion
 from . import metrics
 
@@ -64,7 +65,11 @@ def compare_all(result: Result) -> tuple[list[Comparison], list[str]]:
             "which one tells the truth is unclear; an estimator needs the output sample_time"
         ]
     found: list[Comparison] = []
-    notes: list[str] = []
+    notes = [
+        f"{component} is not compared: it has no output sample_time, as an estimator needs"
+        for component in _with_attitude(result.names)
+        if plants == [TRUTH] and component not in (TRUTH, PLANT, *estimators)
+    ]
     for component in estimators:
         try:
             found.append(_compare(result, plants[0], component, notes))
@@ -79,11 +84,16 @@ def knowing(names: Iterable[str]) -> tuple[list[str], list[str]]:
     A truth that follows from what a plant says in words of its own is the only one.
     """
     known = list(names)
-    endings = (".vertical[1]", ".vertical[0]")  # a vector from 0 has both
-    attitudes = list(dict.fromkeys(name[: -len(endings[0])] for name in known if name.endswith(endings)))
+    attitudes = _with_attitude(known)
     estimators = [component for component in attitudes if f"{component}.sample_time" in known]
     plants = [component for component in attitudes if component not in estimators]
     return [TRUTH] if TRUTH in plants else plants, estimators
+
+
+def _with_attitude(names: Iterable[str]) -> list[str]:
+    """Components that report a vertical."""
+    endings = (".vertical[1]", ".vertical[0]")  # a vector from 0 has both
+    return list(dict.fromkeys(name[: -len(endings[0])] for name in names if name.endswith(endings)))
 
 
 def _compare(result: Result, plant: str, component: str, notes: list[str]) -> Comparison:

@@ -17,11 +17,11 @@ from ...fmi.archive import read_fmu
 from ...registry import BLOCKS, ESTIMATORS
 from ..devices import DeviceValue, device_values
 from ..interface import Interface, WiringError
-from ..truth import COMPONENT, Told, derived_names, knows_attitude
+from ..truth import COMPONENT, PLANT, Told, derived_names, knows_attitude
 from .description_xml import Part, Wire, written
 from .matching import ALIASES, READ, TOLD, Ask, Choice, Matcher, short, with_form
 
-PLANT, IMU, NO_IMU = "plant", "imu", "none"
+IMU, NO_IMU = "imu", "none"
 _STOP = 10.0  # s, where neither the plant nor the user says
 _PERIOD = 0.01  # s
 _SENSORS = {"angular_velocity": (ANGULAR_VELOCITY, GYRO), "specific_force": (SPECIFIC_FORCE, ACCEL)}
@@ -77,9 +77,10 @@ def connect(
     if rate is not None and not 0 < rate < 1e6:
         raise ValueError(f"rate = {rate:g}: expected samples per second, such as 200")
     path = Path(plant)
-    model = read_fmu(path)
+    faults: list[str] = []
+    model = read_fmu(path, faults)
     given = _known_names({ALIASES.get(key, key): text for key, text in (mapping or {}).items()})
-    result = Connected(name=path.stem)
+    result = Connected(name=path.stem, notes=faults)
     problems: list[str] = []
     outputs = _matcher(path.name, model, "output")
     device = {} if str(imu) == NO_IMU else device_values(imu)
@@ -188,7 +189,7 @@ def _add_estimator(
     name = _free_name(Path(estimator).stem.replace(".", "_"), taken)
     inputs: dict[str, tuple[Sequence[str], str | None, tuple[float, ...]]] = {}
     if Path(estimator).suffix.lower() == ".fmu":
-        path, model = Path(estimator).resolve(), read_fmu(Path(estimator))
+        path, model = Path(estimator).resolve(), read_fmu(Path(estimator), result.notes)
         matcher = _matcher(Path(estimator).name, model, "input")
         for quantity in READ:
             text = given.get(f"{name}.{quantity}") or given.get(f"{name}.{short(quantity)}")
