@@ -120,6 +120,9 @@ def test_a_parameter_of_the_system_reaches_the_fmu_that_it_is_connected_to(tmp_p
     assert offsets(path) == {"inner.clock.offset": 23.0}  # 2 (2 5 + 1) + 1
     assert offsets(path, height=1) == {"inner.clock.offset": 7.0}
     assert simulate(path)["inner.clock.y"][0] == 23.0
+    idle = write(tmp_path / "c.ssd", system("w", [CLOCK], connectors=[connector("height", "parameter")]))
+    with pytest.raises(WiringError, match="height = 1: nothing is connected to it"):
+        offsets(idle, height=1)
     unbound = write(tmp_path / "b.ssd", whole.replace(bound, ""))
     assert "nothing gives height a value: inner.clock.offset keeps its start value" in System.read(unbound).notes
 
@@ -157,6 +160,8 @@ def test_a_parameter_mapping_renames_and_transforms_and_leaves_the_rest_out(tmp_
     bound = f'<ssd:ParameterBinding prefix="s.">{values}{mapping}</ssd:ParameterBinding>'
     path = write(tmp_path / "a.ssd", system("w", [CLOCK], bindings=bound))
     assert offsets(path) == {"clock.offset": 13.0, "clock.start_steps": 70}
+    lost = write(tmp_path / "b.ssd", system("w", [CLOCK], bindings=bound.replace('name="count"', 'name="amount"')))
+    noted(lost, "no value is called s.count, which is to be mapped")
     assert not [note for note in System.read(path).notes if "standard" in note]
 
 
