@@ -11,6 +11,7 @@ from typing import Any
 
 from ..files.locations import models_folder
 from ..files.names import no_such
+from ..files.scratch import new_scratch
 from ..fmi.archive import interface_of, kinds_of, read_fmu
 from ..fmi.build import cached_fmu
 from ..fmi.native import cached_native_fmu
@@ -94,7 +95,7 @@ class System:
         try:
             path = folder / f"{connected.name}.ssd"
             path.write_bytes(connected.text(folder))
-            system = _read(path, native, strict=False)
+            system = _read(path, native, False, Packages(), None)
         finally:
             delete()
         return replace(system, notes=(*connected.lines, *system.notes))

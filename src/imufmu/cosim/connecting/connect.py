@@ -77,7 +77,7 @@ def connect(
     if rate is not None and not 0 < rate < 1e6:
         raise ValueError(f"rate = {rate:g}: expected samples per second, such as 200")
     path = Path(plant)
-    model = read_fmu(path)
+    model = read_fmu(path, [])  # what is odd is noted when it runs
     given = _known_names({ALIASES.get(key, key): text for key, text in (mapping or {}).items()})
     result = Connected(name=path.stem)
     problems: list[str] = []
@@ -188,7 +188,7 @@ def _add_estimator(
     name = _free_name(Path(estimator).stem.replace(".", "_"), taken)
     inputs: dict[str, tuple[Sequence[str], str | None, tuple[float, ...]]] = {}
     if Path(estimator).suffix.lower() == ".fmu":
-        path, model = Path(estimator).resolve(), read_fmu(Path(estimator))
+        path, model = Path(estimator).resolve(), read_fmu(Path(estimator), [])
         matcher = _matcher(Path(estimator).name, model, "input")
         for quantity in READ:
             text = given.get(f"{name}.{quantity}") or given.get(f"{name}.{short(quantity)}")
