@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 import imufmu
-from imufmu import BuildError, System
+from imufmu import BuildError, DescriptionError, System
 from imufmu.cosim.devices import changed_device, device_parameters, device_values, rate_parameters
 from imufmu.fmi.native import block_called, with_imu
+from support.cosim_stubs import parameter_set
 
 PENDULUM = "pendulum_lee2012"  # with an mtx at 100 Hz
 
@@ -44,6 +45,17 @@ def test_a_device_with_less_errors_than_others_sets_theirs_to_their_start() -> N
     assert changed["gyro_bias_instability"] == 0.0  # of the mtx; no figure for the mpu9150
     assert changed["gyro_bias[1]"] != 0.0
     assert "seed" not in changed
+
+
+def test_a_device_of_another_unit_is_converted_and_one_of_another_kind_refused(tmp_path) -> None:
+    values = {"gyro_noise_density": ("Real", 1.0, "deg/s/sqrt(Hz)"), "accel_range": ("Real", 16, "g")}
+    (tmp_path / "mine.ssv").write_text(parameter_set(values))
+    mine = device_values(tmp_path / "mine.ssv")
+    assert mine["gyro_noise_density"].number == pytest.approx(np.pi / 180, rel=1e-12)  # a few roundings
+    assert (mine["accel_range"].number, mine["accel_range"].unit) == (pytest.approx(16 * 9.80665), "m/s2")
+    (tmp_path / "mine.ssv").write_text(parameter_set({"accel_range": ("Real", 16, "rad/s")}))
+    with pytest.raises(DescriptionError, match=r"mine\.ssv, line 2: accel_range = 16: rad/s and m/s2 differ in kind"):
+        device_values(tmp_path / "mine.ssv")
 
 
 def test_a_rate_is_that_of_everything(system: System) -> None:

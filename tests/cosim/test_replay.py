@@ -20,6 +20,7 @@ from imufmu.fmi.build import cached_fmu
 from imufmu.recordings import reading as recordings
 from imufmu.registry import BLOCKS
 from support import golden
+from support.cosim_stubs import edited_fmu
 
 PERIOD = 0.0035  # s, that of BROAD
 
@@ -126,6 +127,17 @@ def test_inputs_that_count_from_0_are_the_same_axes(tmp_path, rng):
     result = replay(recording, from_0)
     assert np.array_equal(result.columns["roll"], replay(recording, cached_fmu("lee2012")).columns["roll"])
     assert sum("count from 0" in note for note in result.notes) == 2
+
+
+def test_four_inputs_from_0_are_no_three_axes(tmp_path, rng):
+    fourth = '<ScalarVariable name="gyro[0]" valueReference="900" causality="input"><Real start="0"/></ScalarVariable>'
+    fmu = edited_fmu(
+        tmp_path / "four.fmu",
+        cached_fmu("lee2012"),
+        lambda text: text.replace("</ModelVariables>", f"{fourth}</ModelVariables>"),
+    )
+    with pytest.raises(ValueError, match=r"inputs gyro\[0\] to gyro\[3\] of the FMU: which three of them are x, y, z"):
+        replay(recordings.read(record(tmp_path / "r.csv", rng, n=50)), fmu)
 
 
 def test_the_sample_period_follows_the_recording_and_no_other_is_accepted(tmp_path, rng):

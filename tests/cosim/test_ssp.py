@@ -8,9 +8,9 @@ from typing import Any
 
 import pytest
 
-from imufmu import DescriptionError, System, WiringError, pack
+from imufmu import ArchiveError, DescriptionError, System, WiringError, pack
 from imufmu.cosim.ssp.files import NAMESPACES
-from support.cosim_stubs import binding, fake_fmu, parameter_set, simulate, stub, variable
+from support.cosim_stubs import binding, fake_fmu, parameter_set, simulate, stub, variable, write_zip
 
 HEAD = " ".join(f'xmlns:{prefix}="{uri}"' for prefix, uri in NAMESPACES.items())
 
@@ -64,6 +64,7 @@ def write(path: Path, whole: str, *, version: str = "1.0", after: str = "", expe
 
 
 CLOCK = component("clock", stub("clock"), [connector("y", "output"), connector("offset", "parameter")])
+LATE = binding({"offset": ("Real", 9, None)})
 DOUBLE, TRIPLE = (f'<ssc:LinearTransformation factor="{factor}" offset="1"/>' for factor in (2, 3))
 
 
@@ -120,6 +121,9 @@ def test_a_parameter_of_the_system_reaches_the_fmu_that_it_is_connected_to(tmp_p
     assert offsets(path) == {"inner.clock.offset": 23.0}  # 2 (2 5 + 1) + 1
     assert offsets(path, height=1) == {"inner.clock.offset": 7.0}
     assert simulate(path)["inner.clock.y"][0] == 23.0
+    idle = write(tmp_path / "c.ssd", system("w", [CLOCK], connectors=[connector("height", "parameter")]))
+    with pytest.raises(WiringError, match="height = 1: nothing is connected to it"):
+        offsets(idle, height=1)
     unbound = write(tmp_path / "b.ssd", whole.replace(bound, ""))
     assert "nothing gives height a value: inner.clock.offset keeps its start value" in System.read(unbound).notes
 
@@ -157,6 +161,8 @@ def test_a_parameter_mapping_renames_and_transforms_and_leaves_the_rest_out(tmp_
     bound = f'<ssd:ParameterBinding prefix="s.">{values}{mapping}</ssd:ParameterBinding>'
     path = write(tmp_path / "a.ssd", system("w", [CLOCK], bindings=bound))
     assert offsets(path) == {"clock.offset": 13.0, "clock.start_steps": 70}
+    lost = write(tmp_path / "b.ssd", system("w", [CLOCK], bindings=bound.replace('name="count"', 'name="amount"')))
+    noted(lost, "no value is called s.count, which is to be mapped")
     assert not [note for note in System.read(path).notes if "standard" in note]
 
 
@@ -255,6 +261,22 @@ def test_a_system_may_stand_in_a_file_of_its_own_or_be_used_twice(tmp_path: Path
         assert simulate(path)["sampler.y"][0] == 5.0
         with pytest.raises(DescriptionError, match="part refers to another system; put that in its place to pack it"):
             pack(path, tmp_path / "a.ssp")
+
+
+def test_an_archive_may_be_a_component_and_hold_several_descriptions(tmp_path: Path) -> None:
+    inner = system("inner", [component("clock", "clock.fmu", [connector("y", "output")])])
+    late = inner.replace("</ssd:Component>", f"<ssd:ParameterBindings>{LATE}</ssd:ParameterBindings></ssd:Component>")
+    descriptions = {
+        "SystemStructure.ssd": write(tmp_path / "one.ssd", inner).read_text(),
+        "late.ssd": write(tmp_path / "two.ssd", late).read_text(),
+    }
+    write_zip(tmp_path / "a.ssp", {**descriptions, "clock.fmu": stub("clock").read_bytes()})
+    elements = [component("early", "a.ssp"), component("late", "a.ssp#late.ssd")]
+    result = simulate(write(tmp_path / "a.ssd", system("w", elements)))
+    assert (result["early.clock.y"][0], result["late.clock.y"][0]) == (0.0, 9.0)
+    missing = write(tmp_path / "b.ssd", system("w", [component("none", "a.ssp#../one.ssd")]))
+    with pytest.raises(ArchiveError, match=r"a\.ssp: \.\./one\.ssd is missing"):
+        System.read(missing)
 
 
 def test_descriptions_that_hold_each_other_are_refused(tmp_path: Path) -> None:

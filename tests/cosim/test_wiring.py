@@ -149,6 +149,9 @@ def test_units_may_differ_where_the_author_converts(tmp_path: Path) -> None:
 def test_a_unit_that_one_end_does_not_name_is_a_note(tmp_path: Path) -> None:
     notes = read(tmp_path, ["plant.bare -> sensor.rate"]).notes
     assert "plant.bare -> sensor.rate [rad/s]: one end does not name its unit; taken for the same" in notes
+    both = read(tmp_path, ["plant.bare -> sensor.rate", "plant.w -> sensor.anything"]).notes
+    (note,) = [note for note in both if "does not name its unit" in note]
+    assert note.startswith("plant.bare -> sensor.rate [rad/s], plant.w [rad/s] -> sensor.anything: one end")
 
 
 def test_whole_numbers_feed_a_real_input(tmp_path: Path) -> None:

@@ -316,4 +316,6 @@ def test_faults_of_a_model_description_are_told_to_those_who_ask_and_refused_for
     assert len(faults) == 1 and told in faults[0] and str(path) in faults[0]
     with pytest.raises(ArchiveError, match=re.escape(told)):
         read_fmu(path)
-    assert any(finding.level is Level.PROBLEM and told in finding.text for finding in examine(path))
+    findings = examine(path)
+    assert any(finding.level is Level.PROBLEM and told in finding.text for finding in findings)
+    assert any("runs it" in finding.text and "with --strict it refuses" in finding.text for finding in findings)

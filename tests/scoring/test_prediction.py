@@ -147,3 +147,16 @@ def test_a_device_without_a_gyroscope_noise_is_refused(tmp_path: Path) -> None:
     silent.write_text(text.replace('name="gyro_noise_density"', 'name="gyro_bias[1]"'))
     with pytest.raises(ValueError, match=re.escape(f"{silent}: sets no gyro_noise_density")):
         p.predict(silent, 1.0)
+
+
+def test_a_noise_in_degrees_is_converted_and_one_of_another_kind_refused(tmp_path: Path) -> None:
+    text = (p.models_folder() / "imus" / "mtx.ssv").read_text()
+    of_mtx = p.gyro_noise_density_of("mtx")
+    value = f'value="{of_mtx!r}" unit="rad/s/sqrt(Hz)"'
+    assert value in text
+    other = tmp_path / "other.ssv"
+    other.write_text(text.replace(value, f'value="{math.degrees(of_mtx)!r}" unit="deg/s/sqrt(Hz)"'))
+    assert p.gyro_noise_density_of(other) == pytest.approx(of_mtx, rel=1e-12)  # a few roundings
+    other.write_text(text.replace(value, 'value="1" unit="deg/s"'))
+    with pytest.raises(ValueError, match=r"gyro_noise_density: deg/s and rad/s/sqrt\(Hz\) differ in kind"):
+        p.gyro_noise_density_of(other)

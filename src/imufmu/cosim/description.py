@@ -36,6 +36,7 @@ from .ssp.files import (
     required,
     units_in,
 )
+from .ssp.packages import Packages
 from .ssp.parameters import ParameterValue, bound_values
 from .ssp.signals import Dictionaries
 from .ssp.transformations import Transformation, transformation_of
@@ -128,14 +129,15 @@ class Description:
     truth: tuple[Told, ...] = ()  # what the plant tells of its attitude, where that is not in our words
 
 
-def read_description(path: Path, inside: Path | None = None) -> Description:
+def read_description(path: Path, inside: Path | None = None, packages: Packages | None = None) -> Description:
     """Read an .ssd file; ``inside``: the folder that its sources must not leave.
 
-    Raises DescriptionError, and ArchiveError for XML that is unsafe or not well-formed.
+    packages: unpacks the archives that it refers to; None: it may refer to none. Raises DescriptionError, and
+    ArchiveError for XML that is unsafe or not well-formed.
     """
     faults: list[str] = []
     root = read_root(read_bytes(path), path, _ROOT, faults)
-    flat = _Flat(inside, faults)
+    flat = _Flat(packages, faults)
     flat.add(_system_of(root, path), "", Sources(path, inside, faults), units_in(root), Dictionaries())
     experiment = root.find("ssd:DefaultExperiment", NAMESPACES)
     start, stop = (
@@ -184,7 +186,7 @@ def _step(root: Any, path: Path) -> float | None:
 class _Flat:
     """Collects what is in nested systems, each thing under its full name."""
 
-    inside: Path | None
+    packages: Packages | None
     faults: list[str]
     components: list[Component] = field(default_factory=list)
     systems: dict[str, dict[str, Connector]] = field(default_factory=dict)
@@ -248,15 +250,18 @@ class _Flat:
             self.add(meant, name, files, units, dictionaries, depth)
             self._bind(element, name, files, None, depth)
             return "System"
-        if kind == "application/x-ssp-definition" or element.get("source").lower().endswith(".ssd"):
-            path = files.path(element)
+        if _is_system(element):
+            path, fragment = files.path_and_fragment(element)
+            inside = files.inside
+            if self.packages and path.suffix.lower() == ".ssp":
+                path, inside = self.packages.structure(path, fragment)
             root = read_root(read_bytes(path), path, _ROOT, self.faults)
-            inner = Sources(path, self.inside, self.faults)
+            inner = Sources(path, inside, self.faults)
             self.add(_system_of(root, path), name, inner, units_in(root), Dictionaries(), depth)
             self._bind(element, name, files, path, depth)
             return "System"
         if kind != FMU_TYPE:
-            raise DescriptionError(f"{where} is no FMU, but {kind}; only FMUs and .ssd files are supported")
+            raise DescriptionError(f"{where} is no FMU and no system, but {kind}: there is no way to run it")
         source = files.path(element)
         connectors = dict(connectors_of(element, files, units))
         self.components.append(
@@ -272,6 +277,12 @@ class _Flat:
         )
         self._bind(element, name, files, source, depth)
         return "Component"
+
+
+def _is_system(element: Any) -> bool:
+    """Whether a component is a description of a system, by its type or the end of its name."""
+    kind, name = element.get("type", ""), element.get("source").partition("#")[0].lower()
+    return kind in ("application/x-ssp-definition", "application/x-ssp-package") or name.endswith((".ssd", ".ssp"))
 
 
 def _treatment(element: Any, files: Sources) -> str | None:

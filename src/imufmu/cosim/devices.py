@@ -9,8 +9,11 @@ from typing import Any
 
 from ..files.locations import models_folder
 from ..files.names import no_such
+from ..registry import BLOCKS
 from .interface import Interface
-from .ssp.parameters import read_parameter_set
+from .ssp.files import DescriptionError
+from .ssp.parameters import ParameterValue, read_parameter_set
+from .units import SAME, Unit, conversion
 
 _COUNTS = ("seed",)
 _FASTEST = 1e6  # Hz
@@ -44,16 +47,25 @@ def device_file(name: str | Path) -> Path:
 
 
 def device_values(name: str | Path) -> dict[str, DeviceValue]:
-    """Values of a device by parameter of the block imu; none for "ideal".
+    """Values of a device by parameter of the block imu, in its units; none for "ideal".
 
     Raises ValueError where there is no such device, and DescriptionError.
     """
     if str(name) == NO_DEVICE:
         return {}
-    return {
-        value.name: DeviceValue(value.type, value.value, value.unit.name if value.unit else None)
-        for value in read_parameter_set(device_file(name))
-    }
+    return {value.name: _in_our_unit(value) for value in read_parameter_set(device_file(name))}
+
+
+def _in_our_unit(value: ParameterValue) -> DeviceValue:
+    units = {parameter.name: Unit(parameter.unit) for parameter in BLOCKS["imu"].parameters}
+    unit = units.get(value.name.partition("[")[0])
+    try:
+        linear = conversion(value.unit, unit)
+        text = value.value if linear == SAME else repr(linear(float(value.value)))
+    except ValueError as error:
+        raise DescriptionError(f"{value.where}: {value.name} = {value.value}: {error}") from error
+    named = unit if value.unit and unit else value.unit
+    return DeviceValue(value.type, text, named.name if named else None)
 
 
 def changed_device(name: str | Path, starts: Mapping[str, Any]) -> dict[str, Any]:

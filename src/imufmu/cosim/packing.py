@@ -20,7 +20,8 @@ from .description import FMU_TYPE
 from .interface import representation, unit_of
 from .settings import Setting
 from .ssp.files import NAMESPACES, DescriptionError, Sources, read_bytes, read_root
-from .system import STRUCTURE, System
+from .ssp.packages import STRUCTURE
+from .system import System
 
 PARAMETER_SET = "parameters"  # name of the set of each component
 

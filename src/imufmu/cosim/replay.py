@@ -249,6 +249,8 @@ def _from_one(inputs: Sequence[Any], notes: list[str]) -> dict[str, Any]:
     names = {variable.name: variable for variable in inputs}
     for reading in _READINGS:
         if f"{reading}[0]" in names:
+            if f"{reading}[3]" in names:
+                raise ValueError(f"inputs {reading}[0] to {reading}[3] of the FMU: which three of them are x, y, z?")
             axes = [names.pop(f"{reading}[{i}]", None) for i in range(3)]
             names |= {f"{reading}[{i}]": axis for i, axis in enumerate(axes, 1) if axis is not None}
             notes.append(f"inputs {reading}[0], [1], [2] count from 0: taken for the axes x, y, z")

@@ -73,6 +73,8 @@ def given_settings(parameters: Mapping[str, Any], wiring: Wiring, problems: list
             continue
         if found is None:
             problems.append(f"{shown}: {resolver.near(name)}")
+        elif not found:
+            problems.append(f"{shown}: nothing is connected to it")
         settings += found or []
     return merged(settings)
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import weakref
 from collections.abc import Mapping, Sequence
 from copy import copy
@@ -10,7 +9,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from ..files.archives import ArchiveError, unpack
 from ..files.locations import models_folder
 from ..files.names import no_such
 from ..files.scratch import new_scratch
@@ -25,9 +23,8 @@ from .description import Component, Description, DescriptionError, read_descript
 from .interface import Interface, WiringError
 from .links import Link, Wiring
 from .settings import Setting, bound_settings, given_settings, merged
+from .ssp.packages import Packages
 from .wiring import find_wiring
-
-STRUCTURE = "SystemStructure.ssd"  # the description inside an .ssp
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,26 +61,16 @@ class System:
         BuildError or WiringError (all misfits at once).
         """
         path = locate(path).resolve()
-        if path.suffix.lower() != ".ssp":
-            return _read(path, native, strict)
-        scratch, delete = new_scratch("ssp")
-        folder = str(scratch)
-
-        def shown(text: str) -> str:
-            """A user knows the archive, not the folder that it was unpacked to."""
-            return text.replace(f"{folder}{os.sep}", f"{path}: ")
-
+        packages = Packages()
         try:
-            unpack(path, Path(folder))
-            if not (Path(folder) / STRUCTURE).is_file():
-                raise ArchiveError(f"{path}: {STRUCTURE} is missing: this is no SSP")
-            system = _read(Path(folder) / STRUCTURE, native, strict, inside=Path(folder))
+            ssd, inside = packages.structure(path) if path.suffix.lower() == ".ssp" else (path, None)
+            system = _read(ssd, native, strict, packages, inside)
         except BaseException as error:
-            delete()
-            error.args = tuple(shown(str(part)) for part in error.args)
+            packages.delete()
+            error.args = tuple(packages.shown(str(part)) for part in error.args)
             raise
-        system = replace(system, path=path, notes=tuple(map(shown, system.notes)))
-        weakref.finalize(system, delete)
+        system = replace(system, path=path, notes=tuple(map(packages.shown, system.notes)))
+        weakref.finalize(system, packages.delete)
         return system
 
     @staticmethod
@@ -108,7 +95,7 @@ class System:
         try:
             path = folder / f"{connected.name}.ssd"
             path.write_bytes(connected.text(folder))
-            system = _read(path, native, strict=False)
+            system = _read(path, native, False, Packages(), None)
         finally:
             delete()
         return replace(system, notes=(*connected.lines, *system.notes))
@@ -142,9 +129,9 @@ def locate(name: str | Path) -> Path:
     return systems[str(name)]
 
 
-def _read(path: Path, native: bool, strict: bool, inside: Path | None = None) -> System:
+def _read(path: Path, native: bool, strict: bool, packages: Packages, inside: Path | None) -> System:
     """Read an .ssd; ``inside``: the folder that its files must not leave."""
-    description = read_description(path, inside)
+    description = read_description(path, inside, packages)
     _check_names(description)
     faults = list(description.faults)
     models: dict[Path, Any] = {}

@@ -14,6 +14,7 @@ from .units import UnitError
 # Causalities of variables that can feed, and that can be fed. A local variable is no output, but can be read as one.
 _FROM = ("output", "calculatedParameter", "local")
 _TO = ("input", "parameter", "structuralParameter")
+_TOLD = 3  # connections told by name in one note
 
 
 def find_wiring(
@@ -33,7 +34,7 @@ def find_wiring(
     checks = _Checks(wiring, problems, notes, faults)
     for connection in description.connections:
         checks.add(connection)
-    links = []
+    links, linked = [], []
     for way in wiring.ways:
         if way[0][0] not in interfaces:  # a connector of the whole system, or an entry that nothing feeds
             continue
@@ -42,8 +43,9 @@ def find_wiring(
         except ValueError as error:
             problems.append(checks.misfit(way, error))
             continue
-        checks.note_missing_unit(way)
+        linked.append(way)
         checks.note_shifted_index(way)
+    checks.note_missing_units(linked)
     wiring.links = tuple(links)
     return wiring
 
@@ -160,15 +162,21 @@ class _Checks:
         suggestion = self.wiring.interfaces[a].suggest(x, "output", unit_of(ends[1][1]))
         return f'{start}: {error}. {suggestion}. To pass the numbers as they are: suppressUnitConversion="true"'
 
-    def note_missing_unit(self, way: Sequence[Node]) -> None:
-        """Say so where one end names its unit and the other does not."""
-        units = self.wiring.unit(way[0]), self.wiring.unit(way[-1])
-        kinds = {representation(self.wiring.interfaces[c].variables[v]) for c, v in (way[0], way[-1])}
-        same_units = all(self.wiring.feeders[node][1].same_units for node in way[1:])
-        if kinds == {"Real"} and (units[0] is None) != (units[1] is None) and same_units:
+    def note_missing_units(self, ways: Sequence[Sequence[Node]]) -> None:
+        """Say so where one end names its unit and the other does not, once for each pair of components."""
+        pairs: dict[tuple[str, str], list[str]] = {}
+        for way in ways:
+            units = self.wiring.unit(way[0]), self.wiring.unit(way[-1])
             ends = [(c, self.wiring.interfaces[c].variables[v]) for c, v in (way[0], way[-1])]
-            names = " -> ".join(label(*end) for end in ends)
-            self.notes.append(f"{names}: one end does not name its unit; taken for the same")
+            same_units = all(self.wiring.feeders[node][1].same_units for node in way[1:])
+            are_real = all(representation(variable) == "Real" for _, variable in ends)
+            if are_real and same_units and (units[0] is None) != (units[1] is None):
+                names = " -> ".join(label(*end) for end in ends)
+                pairs.setdefault((way[0][0], way[-1][0]), []).append(names)
+        for names in pairs.values():
+            more = f" and {len(names) - _TOLD} more" if len(names) > _TOLD else ""
+            told = ", ".join(names[:_TOLD])
+            self.notes.append(f"{told}{more}: one end does not name its unit; taken for the same")
 
     def note_shifted_index(self, way: Sequence[Node]) -> None:
         """Say so where equal indices are not the same axis: one end counts from 0, the other from 1."""

@@ -173,12 +173,14 @@ def _python_packages(path: Path) -> Finding:
 
 def _here(path: Path) -> Finding:
     """Whether imufmu runs it, as a plant or anything else in a system."""
+    faults: list[str] = []
     try:
-        model = read_fmu(path, [])  # what is formally wrong is told above
+        model = read_fmu(path, faults)
     except ArchiveError as error:
         return Finding(Level.NOTE, "imufmu", f"does not run it: {str(error).removeprefix(f'{path}: ')}")
     solver = "" if model.coSimulation else ", its equations solved by CVode of FMPy"
-    return Finding(Level.GOOD, "imufmu", f"runs it as a component of a system on this machine{solver}")
+    odd = ", and notes what breaks the standard; with --strict it refuses" if faults else ""
+    return Finding(Level.GOOD, "imufmu", f"runs it as a component of a system on this machine{solver}{odd}")
 
 
 def _hosts(platforms: list[str], model: Any, is_python: bool) -> Iterator[Finding]:

@@ -20,7 +20,7 @@ def facts(fmu: str) -> dict[str, Any]:
     for what is no FMU 2.0 or 3.0.
     """
     path = file_of(fmu)
-    names, model = read_model(path)
+    names, model = read_model(path, [])
     experiment = model.defaultExperiment
     interfaces = [part for part in (model.coSimulation, model.modelExchange, model.scheduledExecution) if part]
     binaries = [name.split("/") for name in names if name.startswith("binaries/")]

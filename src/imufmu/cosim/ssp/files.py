@@ -64,6 +64,13 @@ class Sources:
 
     def path(self, element: Any) -> Path:
         """Path that the ``source`` attribute of an element means. Raises DescriptionError."""
+        path, fragment = self.path_and_fragment(element)
+        if fragment:
+            raise DescriptionError(f"{self.where(element)}: source {element.get('source')!r}: leave out #{fragment}")
+        return path
+
+    def path_and_fragment(self, element: Any) -> tuple[Path, str]:
+        """The same, with what stands behind a #."""
         source = required(element, "source", self.ssd)
         where = f"{self.where(element)}: source {source!r}"
         plain = source
@@ -81,12 +88,12 @@ class Sources:
             path = re.sub(r"^/(?=[A-Za-z]:)", "", path)  # file:///C:/...
         elif address.scheme or address.netloc:
             raise DescriptionError(f"{where}: expected a path relative to the description, or a file: URI")
-        if address.fragment or not path:
+        if not path:
             raise DescriptionError(f"{where}: expected a path relative to the description")
         found = (self.ssd.parent / path).resolve()
         if self.inside and not found.is_relative_to(self.inside):
             raise DescriptionError(f"{where}: leaves the archive")
-        return found
+        return found, address.fragment
 
     def content(self, element: Any, component: Path | None) -> tuple[bytes, Path]:
         """Content of the source of an element, and the path that names it in messages.

@@ -60,7 +60,13 @@ def bound_values(element: Any, name: str, files: Sources, component: Path | None
             yield from _sets(binding, around + prefix, files, component)
         else:
             found = list(_sets(binding, prefix, files, component))
-            yield from _mapped(found, _mapping(mapping, files, component), around)
+            entries = _mapping(mapping, files, component)
+            lost = [entry.source for entry in entries if entry.source not in {value.name for value in found}]
+            if lost:
+                files.faults.append(
+                    f"{files.where(mapping)}: no value is called {', '.join(lost)}, which is to be mapped"
+                )
+            yield from _mapped(found, entries, around)
 
 
 def _sets(binding: Any, prefix: str, files: Sources, component: Path | None) -> Iterator[ParameterValue]:
