@@ -39,11 +39,12 @@ from .text_reading import read_text
 from .told import Told, recall
 
 TEXTS = (".csv", ".txt", ".tsv", ".dat", ".log")
+OTHERS = (".zip", ".mat")
 _READINGS = (v.GYRO.name, v.ACCEL.name, v.MAG.name, v.FORWARD_SPEED.name)
 _TRUTH = (v.Q_NS.name, v.ROLL.name, v.PITCH.name, v.YAW.name)
 _PERIOD_BOUNDS = v.sample_period(0.01)
 
-__all__ = ["Recording", "RecordingError", "hold_missing", "read"]
+__all__ = ["Recording", "RecordingError", "hold_missing", "is_recording", "read", "recordings_in"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,6 +148,19 @@ def read(
     except MemoryError:
         raise RecordingError(f"{path}: too large for this machine's memory; split it") from None
     return _recording(path, raw, turned, [*notes, *raw.notes])
+
+
+def is_recording(path: Path) -> bool:
+    """Whether a file has the name of a recording: what ``read`` would not refuse for its name alone."""
+    return path.is_file() and path.suffix.lower() in (*TEXTS, *OTHERS)
+
+
+def recordings_in(folder: Path) -> list[Path]:
+    """Every file in a folder that is read as a recording. Raises RecordingError if there is no such folder."""
+    try:
+        return sorted(path for path in folder.iterdir() if is_recording(path))
+    except OSError as error:
+        raise RecordingError(f"{folder}: cannot list the folder: {error.strerror}") from None
 
 
 def _reader(path: Path) -> Callable[[Path, Told], Raw]:
