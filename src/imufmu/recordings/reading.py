@@ -152,7 +152,7 @@ def read(
 
 def is_recording(path: Path) -> bool:
     """Whether a file has the name of a recording: what ``read`` would not refuse for its name alone."""
-    return path.is_file() and path.suffix.lower() in (*TEXTS, *OTHERS)
+    return is_log(path) or (path.is_file() and path.suffix.lower() in (*TEXTS, *OTHERS))
 
 
 def recordings_in(folder: Path) -> list[Path]:

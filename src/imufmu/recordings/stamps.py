@@ -81,7 +81,7 @@ def _unit(stamps: np.ndarray, unit: str | None, notes: list[str]) -> float:
 
 def _mean_step(steps: np.ndarray) -> float:
     """Mean of the intervals without the few longest, and whatever comes together."""
-    return float(np.mean(np.clip(steps, 0, 2 * np.quantile(steps, 0.99)))) if len(steps) else 0.0
+    return float(np.mean(np.clip(steps, 0, 2 * np.quantile(steps, 0.99, method="lower")))) if len(steps) else 0.0
 
 
 def _unwrapped(stamps: np.ndarray, notes: list[str]) -> np.ndarray:
