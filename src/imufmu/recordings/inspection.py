@@ -27,6 +27,7 @@ class Inspection:
     findings: list[str]
 
 
+@np.errstate(over="ignore", invalid="ignore")  # absurd values are for the findings
 def inspect(recording: Recording) -> Inspection:
     """Look at a recording."""
     facts = {"recording": str(recording.path), **recording.facts}

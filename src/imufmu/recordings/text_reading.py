@@ -229,6 +229,7 @@ def _factors(
     return np.array(found)
 
 
+@np.errstate(over="ignore", invalid="ignore")
 def _guessed(
     table: TextTable, choice: Choice, signal: str, raw: Mapping[str, np.ndarray], clock: Clock, notes: list[str]
 ) -> float:

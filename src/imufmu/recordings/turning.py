@@ -52,6 +52,7 @@ class Turning:
         return self.scale == 1 and bool((self.matrix == np.eye(3)).all())
 
 
+@np.errstate(over="ignore", invalid="ignore")  # of absurd values nothing is told
 def turning(gyro: np.ndarray, accel: np.ndarray, index: np.ndarray, period: float) -> Turning:
     """Readings (n, 3), rad/s and any unit, their whole-number instants (n,) and the sample period (s)."""
     unknown = Turning(np.eye(3), 1.0, False)
@@ -77,6 +78,7 @@ def turning(gyro: np.ndarray, accel: np.ndarray, index: np.ndarray, period: floa
     return Turning(matrix, scale, True)
 
 
+@np.errstate(over="ignore", invalid="ignore")
 def best_scale(gyro: np.ndarray, accel: np.ndarray, index: np.ndarray, period: float, scales: Sequence[float]) -> int:
     """Place of the factor of the gyroscope that fits much better than the others, -1 where none does."""
     windows = _windows(gyro, accel, index, period)
