@@ -46,7 +46,7 @@ def peer_replays(recording: Recording) -> list[Replay]:
         columns = {"roll": angles[:, 0], "pitch": angles[:, 1]}
         columns |= {f"vertical[{i + 1}]": vertical[:, i] for i in range(3)}
         units = {name: "rad" if name in ("roll", "pitch") else "1" for name in columns}
-        replays.append(Replay(recording, peer.name, in_axes_of(recording, columns), units, ()))
+        replays.append(Replay(recording, peer.name, in_axes_of(recording, columns, units), units, ()))
     return replays
 
 

@@ -37,7 +37,8 @@ def replay_offline(recording: Recording, name: str, parameters: Mapping[str, Any
         parts = {signal_name: rows} if rows.ndim == 1 else {f"{signal_name}[{i + 1}]": rows[:, i] for i in range(3)}
         columns |= parts
     notes = (*recording.notes, *axes_doubts(recording))
-    return Replay(recording, name, in_axes_of(recording, columns), {c: units[c.split("[")[0]] for c in columns}, notes)
+    of_columns = {column: units[column.split("[")[0]] for column in columns}
+    return Replay(recording, name, in_axes_of(recording, columns, of_columns), of_columns, notes)
 
 
 def _in_unit(block: SampledBlock, name: str, value: Any) -> Any:

@@ -95,15 +95,16 @@ def _signals(columns: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
     return {name: np.column_stack(part) if name in vectors else part[0] for name, part in parts.items()}
 
 
-def in_axes_of(recording: Recording, columns: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """Estimates (n,) by variable name in the axes of the recording's file, and not in ours."""
+def in_axes_of(recording: Recording, columns: dict[str, np.ndarray], units: Mapping[str, str]) -> dict[str, np.ndarray]:
+    """Estimates (n,) by variable name in the axes of the recording's file, and not in ours. units: by variable name."""
     if recording.axes.are_ours:
         return columns
-    turned = recording.axes.from_ours(_signals(columns))
+    scales = {name: np.pi / 180 for name in ("roll", "pitch", "yaw") if units.get(name) == "deg"}
+    turned = recording.axes.from_ours(_signals({name: scales.get(name, 1) * c for name, c in columns.items()}))
     flat = dict(columns)
     for name, values in turned.items():
         if values.ndim == 1:
-            flat[name] = values
+            flat[name] = values / scales.get(name, 1)
         elif f"{name}[1]" in columns:
             flat |= {f"{name}[{i + 1}]": values[:, i] for i in range(values.shape[1])}
     return flat
@@ -151,11 +152,12 @@ def replay(
     def result(partial: str = "") -> Replay:
         rows = np.searchsorted(recording.sample_index, run.done)
         at_rows = run.rows[recording.sample_index[:rows]]
+        units = {v.name: unit_of(v) or "" for v in reported}
         return Replay(
             recording,
             interface.component,
-            in_axes_of(recording, {v.name: at_rows[:, i] for i, v in enumerate(reported)}),
-            {v.name: unit_of(v) or "" for v in reported},
+            in_axes_of(recording, {v.name: at_rows[:, i] for i, v in enumerate(reported)}, units),
+            units,
             (*recording.notes, *axes_doubts(recording), *notes),
             f"{rows} of {len(recording.time)} rows: {partial}" if partial else "",
         )

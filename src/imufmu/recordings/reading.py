@@ -39,7 +39,7 @@ from .text_reading import read_text
 from .told import Told, recall
 
 TEXTS = (".csv", ".txt", ".tsv", ".dat", ".log")
-OTHERS = (".zip", ".mat")
+KINDS = (*TEXTS, ".zip", *LOGS, ".mat")  # ends of names of what is read
 _READINGS = (v.GYRO.name, v.ACCEL.name, v.MAG.name, v.FORWARD_SPEED.name)
 _TRUTH = (v.Q_NS.name, v.ROLL.name, v.PITCH.name, v.YAW.name)
 _PERIOD_BOUNDS = v.sample_period(0.01)
@@ -152,7 +152,7 @@ def read(
 
 def is_recording(path: Path) -> bool:
     """Whether a file has the name of a recording: what ``read`` would not refuse for its name alone."""
-    return is_log(path) or (path.is_file() and path.suffix.lower() in (*TEXTS, *OTHERS))
+    return is_log(path) or (path.is_file() and path.suffix.lower() in KINDS)
 
 
 def recordings_in(folder: Path) -> list[Path]:
@@ -174,8 +174,8 @@ def _reader(path: Path) -> Callable[[Path, Told], Raw]:
         return lambda path, told: read_text(path, told.rate, told.columns)
     if suffix == ".mat":
         return lambda path, told: read_broad(path)
-    kinds = ", ".join((*TEXTS, ".zip", *LOGS))
-    raise RecordingError(f"{path}: cannot read {suffix or 'a file without suffix'}; use {kinds}, or .mat for BROAD")
+    kinds = ", ".join(KINDS)
+    raise RecordingError(f"{path}: cannot read {suffix or 'a file without suffix'}; use {kinds} (of BROAD)")
 
 
 def _recording(path: Path, raw: Raw, axes: Axes, notes: Sequence[str]) -> Recording:
