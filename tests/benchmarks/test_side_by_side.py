@@ -43,7 +43,9 @@ def test_filters_of_others_give_the_vertical_and_its_angles(tmp_path: Path) -> N
         signals = replay.signals()
         tilted = inclination_error(signals["vertical"], recording.truth["vertical"])
         assert np.rad2deg(tilted[200:].max()) < 5, replay.estimator  # 1.6 at most where they have settled
-        np.testing.assert_allclose(-np.sin(signals["pitch"]), signals["vertical"][:, 0], atol=1e-6)  # of single precision
+        np.testing.assert_allclose(
+            -np.sin(signals["pitch"]), signals["vertical"][:, 0], atol=1e-6
+        )  # of single precision
 
 
 def test_parameters_go_to_the_estimators_that_they_name() -> None:

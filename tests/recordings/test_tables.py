@@ -155,6 +155,29 @@ def test_a_speed_that_is_not_valid_is_missing(tmp_path):
     assert np.isnan(found[TIME >= 1]).all()
 
 
+@pytest.mark.parametrize(
+    "stamp", ["2026-03-01T{0}", "2026-03-01 {0}", "2026-03-01T{0}Z", "2026-03-01T{0}+01:00", "{0}"]
+)
+def test_dates_and_times_of_day_are_seconds(tmp_path, stamp):
+    rows = lines_of("", GYRO, ACCEL).strip().splitlines()
+    times = [stamp.format(f"23:59:{56 + t:09.6f}") for t in TIME if t < 4] + [
+        stamp.replace("03-01", "03-02").format(f"00:00:{t - 4:09.6f}") for t in TIME if t >= 4
+    ]
+    text = "\n".join([OURS, *(f"{time},{row}" for time, row in zip(times, rows, strict=True))])
+    recording = read(file(tmp_path, text))
+    assert same(recording)
+    assert np.array_equal(recording.sample_index, np.arange(len(TIME)))  # over midnight, too
+
+
+def test_acceleration_without_gravity_is_not_taken_where_there_is_one_with_it(tmp_path):
+    header = "time,gx,gy,gz,Linear Acceleration x,Linear Acceleration y,Linear Acceleration z,ax,ay,az"
+    path = file(tmp_path, lines_of(header, TIME, GYRO, ACCEL - ACCEL.mean(axis=0), ACCEL))
+    assert same(read(path))
+    lonely = lines_of(",".join(header.split(",")[:7]) + " (m/s2)", TIME, GYRO, 0.1 * np.sin(ACCEL))
+    path = file(tmp_path, lonely.replace("tion x,", "tion x (m/s2),").replace("tion y,", "tion y (m/s2),"))
+    assert any("was gravity taken out" in note for note in read(path, columns=["gyro=gx,gy,gz:rad/s"]).notes)
+
+
 # Files of well-known devices
 
 
@@ -230,3 +253,19 @@ def test_files_of_phyphox_and_x_io_tell_their_units(tmp_path):
     recording = read(path, rate=100.0)
     assert same(recording)
     assert np.allclose(recording.mag, MAG, atol=1e-4)
+
+
+# Rows
+
+
+def test_rows_that_are_written_twice_count_once(tmp_path):
+    header, *rows = lines_of(OURS, TIME, GYRO, ACCEL).splitlines()
+    doubled = [row for i, row in enumerate(rows) for row in [row] * (1 + (i % 10 == 0))]
+    recording = read(file(tmp_path, "\n".join([header, *doubled])))
+    assert same(recording)
+    assert "80 rows repeat the row before them, time and all, and are left out" in recording.notes
+
+
+def test_equal_stamps_of_different_readings_are_samples_of_their_own(tmp_path):
+    recording = read(file(tmp_path, lines_of(OURS, TIME // 0.02 * 0.02, GYRO, ACCEL)))
+    assert same(recording)

@@ -13,8 +13,8 @@ if TYPE_CHECKING:
 File = Annotated[
     Path,
     typer.Argument(
-        help="Recording: a text table (.csv, .txt, ...); a folder or .zip of phyphox, Sensor Logger or x-IMU3; a .mat "
-        "of BROAD"
+        help="Recording: a text table (.csv, .txt, ...); a folder or .zip of phyphox, Sensor Logger or x-IMU3; a log "
+        "of ROS, PX4, ArduPilot or MDF; a .mat of BROAD"
     ),
 ]
 Columns = Annotated[

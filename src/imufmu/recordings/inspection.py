@@ -177,19 +177,19 @@ def _axes(recording: Recording, doubtful: list[str]) -> str:
 
 
 def _clipping(recording: Recording) -> list[str]:
-    """Readings that stay at the largest value of a column, which they reach more than once."""
+    """Axes that stay at their largest reading while the other axes go on."""
     found = []
-    for name in ("gyro", "accel", "mag"):
-        readings = recording.readings.get(name)
-        if readings is None:
+    for name in ("gyro", "accel"):
+        readings = recording.readings[name]
+        if len(readings) < _AT_THE_END or not np.isfinite(readings).all(axis=1).any():
             continue
+        goes_on = np.concatenate([[True], (np.diff(readings, axis=0) != 0).any(axis=1)])
+        largest = np.nanmax(np.abs(readings))
         for axis, column in zip("xyz", readings.T, strict=True):
-            for end in (np.nanmax(column), np.nanmin(column)) if np.isfinite(column).any() else ():
-                at_end = column == end
-                runs = np.convolve(at_end, np.ones(_AT_THE_END), "valid") if len(column) >= _AT_THE_END else np.zeros(1)
-                spread = np.nanmax(column) - np.nanmin(column)
-                outer = abs(end) > 0.5 * np.nanmax(np.abs(readings)) and spread > 0
-                if runs.max() == _AT_THE_END and outer and at_end.mean() < 0.5:
+            for end in (np.nanmax(column), np.nanmin(column)):
+                at_end = (column == end) & goes_on
+                runs = np.convolve(at_end, np.ones(_AT_THE_END), "valid")
+                if runs.max() == _AT_THE_END and abs(end) > 0.5 * largest and at_end.mean() < 0.5:
                     found.append(f"{name} {axis} stays at {end:.6g} for {at_end.sum()} samples: clipped there")
     return found
 

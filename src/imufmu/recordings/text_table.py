@@ -14,6 +14,7 @@ import itertools
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
+from datetime import UTC, datetime
 from pathlib import Path
 
 import numpy as np
@@ -102,6 +103,8 @@ class TextTable:
         except ValueError:
             if text.lower() in ("na", "n/a", "null", "none", "-"):
                 return np.nan
+            if (seconds := _seconds(text)) is not None:
+                return seconds
             raise RecordingError(
                 f"{self.path}, line {line}, column {self.full_names[place]!r}: {listed([cell])} is not a number"
             ) from None
@@ -158,6 +161,18 @@ def read_table(path: Path) -> TextTable:
         header is not None,
         samples,
     )
+
+
+def _seconds(text: str) -> float | None:
+    """Seconds since 1970 of a date with a time, since midnight of a time; None for what is neither."""
+    try:
+        if re.match(r"\d+-\d+-\d+[T ]", text):
+            date = datetime.fromisoformat(text)
+            return (date if date.tzinfo else date.replace(tzinfo=UTC)).timestamp()
+        time = datetime.fromisoformat(f"1970-01-01T{text}+00:00") if re.match(r"\d+:\d+:\d+", text) else None
+    except (ValueError, OverflowError):
+        return None
+    return time.timestamp() if time else None
 
 
 def _encoding(path: Path) -> str:
