@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from imufmu.blocks.rotations import euler_from_quaternion, over_rows
 from imufmu.recordings.reading import RecordingError, read
 from support.rocking import GRAVITY, lines_of, rocking
 
@@ -90,7 +91,9 @@ def test_a_unit_that_the_values_do_not_tell_is_asked_for(tmp_path):
     still = np.column_stack([0.002 * np.sin(TIME), 0 * TIME, 0 * TIME])
     upright = np.tile([0, 0, GRAVITY], (len(TIME), 1))
     path = file(tmp_path, lines_of("time,gx,gy,gz,ax,ay,az", TIME, still, upright))
-    with pytest.raises(RecordingError, match=r"unit of gyro: .*--columns gyro=gx,gy,gz:rad/s \(or deg/s\)"):
+    with pytest.raises(
+        RecordingError, match=r"unit of gyro: .*--columns gyro=gx,gy,gz:rad/s \(or deg/s; counts as deg/s/131\)"
+    ):
         read(path)
     assert np.allclose(read(path, columns=["gyro=gx,gy,gz:deg/s"]).gyro, np.deg2rad(still), atol=1e-8)
 
@@ -269,3 +272,33 @@ def test_rows_that_are_written_twice_count_once(tmp_path):
 def test_equal_stamps_of_different_readings_are_samples_of_their_own(tmp_path):
     recording = read(file(tmp_path, lines_of(OURS, TIME // 0.02 * 0.02, GYRO, ACCEL)))
     assert same(recording)
+
+
+def test_counts_of_a_device_are_told_with_their_scale(tmp_path):
+    counts = (np.round(DEG * 131), np.round(ACCEL / GRAVITY * 16384))
+    path = file(tmp_path, lines_of("millis,gx,gy,gz,ax,ay,az", 1e3 * TIME, *counts, digits=0))
+    with pytest.raises(RecordingError, match="counts as g/16384"):
+        read(path, columns=["time=millis:ms"])
+    recording = read(path, columns=["time=millis:ms", "gyro=gx,gy,gz:deg/s/131", "accel=ax,ay,az:g/16384"])
+    assert same(recording, atol=0.5 / 131 * np.pi / 180)  # half a count; ten times that covers one of the accelerometer
+
+
+def test_angles_of_another_make_are_said_to_be_the_truth_and_their_unit_is_found(tmp_path):
+    roll, pitch, yaw = over_rows(euler_from_quaternion, MOTION["q_NS"]).T
+    header = "time,gyro_x,gyro_y,gyro_z,acc_x,acc_y,acc_z,roll,pitch,yaw"
+    path = file(tmp_path, lines_of(header, TIME, GYRO, ACCEL, *np.rad2deg([roll, pitch, yaw])))
+    recording = read(path)
+    np.testing.assert_allclose(recording.truth["roll"], roll, atol=1e-8)  # of seven digits in degrees
+    said = " ".join(recording.notes)
+    assert "roll, pitch, yaw are taken for the truth" in said and "roll is taken for deg" in said
+
+
+def test_a_magnetometer_in_unknown_units_keeps_its_direction(tmp_path):
+    header = "time,gyro_x,gyro_y,gyro_z,acc_x,acc_y,acc_z,mag_x,mag_y,mag_z"
+    recording = read(file(tmp_path, lines_of(header, TIME, GYRO, ACCEL, 1e-3 * MAG)))
+    lengths = np.linalg.norm(recording.mag, axis=1)
+    assert np.median(lengths) == pytest.approx(50)
+    np.testing.assert_allclose(
+        recording.mag / lengths[:, None], MAG / np.linalg.norm(MAG, axis=1)[:, None], atol=1e-5
+    )  # of 50 in seven digits, a thousandth of it written
+    assert any("nothing tells the unit of mag" in note for note in recording.notes)
