@@ -15,18 +15,20 @@ import numpy as np
 import pytest
 import scipy.io
 
-from imufmu import RecordingError, System, read_recording
+from imufmu import RecordingError, System, inspect_recording, read_recording
 from imufmu.benchmarks.recordings import benchmark
 from imufmu.cosim.description import DescriptionError, read_description
 from imufmu.cosim.interface import WiringError
 from imufmu.files.archives import ArchiveError, unpack
 from imufmu.files.csv_table import write_csv
 from imufmu.fmi.archive import read_fmu
+from imufmu.recordings.inspection import glimpse
 from imufmu.scoring.prediction import gyro_noise_density_of
 from support.cosim_stubs import LIBRARY, binding, model_description, parameter_set, variable, write_ssd, write_zip
+from support.rocking import lines_of, rocking
 
 OURS = (ArchiveError, DescriptionError, RecordingError)
-MANY = 125  # mutations of each file; with 16 files of different kinds 2000 in all
+MANY = 125  # mutations of each file; with 17 files of different kinds 2000 in all
 
 XML_PARTS = [
     b'<?xml version="1.0" encoding="GB2312"?>', b'<?xml version="1.0" encoding="no-such"?>', b"<!DOCTYPE a>", b"]]>",
@@ -78,6 +80,20 @@ def csv(folder: Path) -> bytes:
     columns = {"time": 0.01 * np.arange(20), "gyro": rng.normal(size=(20, 3)), "accel": rng.normal(size=(20, 3))}
     write_csv(folder / "made.csv", columns | {"q_NS": np.tile([1.0, 0, 0, 0], (20, 1))})
     return (folder / "made.csv").read_bytes()
+
+
+def log(_folder: Path) -> bytes:
+    """As another program writes it: semicolons, decimal commas, units in the header, times in bunches."""
+    motion = rocking(0.5)
+    header = "sep=;\nt [ms];Gyro X [deg/s];Gyro Y [deg/s];Gyro Z [deg/s];Acc X (g);Acc Y (g);Acc Z (g)"
+    table = (motion["time"] // 0.02 * 20, motion["gyro"], motion["accel"])
+    return lines_of(header, *table, separator=";").replace(".", ",").encode()
+
+
+def look(path: Path) -> None:
+    """What `imufmu inspect` does, also with what cannot be read."""
+    glimpse(path)
+    inspect_recording(read_recording(path))
 
 
 def mat(compressed: bool, _folder: Path) -> bytes:
@@ -145,6 +161,7 @@ KINDS: dict[str, tuple[str, Make, list[bytes], Callable[[Path], object]]] = {
     "ssv": ("a.ssv", lambda _: parameter_set(VALUES).encode(), XML_PARTS, gyro_noise_density_of),
     "csv": ("a.csv", csv, TEXT_PARTS, read_recording),
     "csv, bytes": ("a.csv", csv, BYTES, read_recording),
+    "log": ("a.txt", log, TEXT_PARTS, look),
     "mat": ("a.mat", partial(mat, False), BYTES, read_recording),
     "mat, compressed": ("a.mat", partial(mat, True), BYTES, read_recording),
     "trials.json": ("trials.json", trials, TEXT_PARTS, read_groups),

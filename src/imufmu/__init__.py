@@ -36,6 +36,7 @@ _FACE: dict[str, tuple[str, str]] = {
         "pictures.figures": {"save_figure": "save"},
         "pictures.motion_figures": {"stick_figure": ""},
         "papers.validate": {"validate": ""},
+        "recordings.inspection": {"inspect_recording": "inspect"},
         "recordings.reading": {"Recording": "", "RecordingError": "", "read_recording": "read"},
         "registry": {"BLOCKS": "", "ESTIMATORS": "", "PLANTS": "", "SENSORS": ""},
         "scoring.metrics": {"errors": ""},

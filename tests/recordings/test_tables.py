@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from imufmu.blocks.rotations import euler_from_quaternion, over_rows
 from imufmu.recordings.reading import RecordingError, read
 from support.rocking import GRAVITY, lines_of, rocking
 
@@ -90,7 +91,9 @@ def test_a_unit_that_the_values_do_not_tell_is_asked_for(tmp_path):
     still = np.column_stack([0.002 * np.sin(TIME), 0 * TIME, 0 * TIME])
     upright = np.tile([0, 0, GRAVITY], (len(TIME), 1))
     path = file(tmp_path, lines_of("time,gx,gy,gz,ax,ay,az", TIME, still, upright))
-    with pytest.raises(RecordingError, match=r"unit of gyro: .*--columns gyro=gx,gy,gz:rad/s \(or deg/s\)"):
+    with pytest.raises(
+        RecordingError, match=r"unit of gyro: .*--columns gyro=gx,gy,gz:rad/s \(or deg/s; counts as deg/s/131\)"
+    ):
         read(path)
     assert np.allclose(read(path, columns=["gyro=gx,gy,gz:deg/s"]).gyro, np.deg2rad(still), atol=1e-8)
 
@@ -153,6 +156,29 @@ def test_a_speed_that_is_not_valid_is_missing(tmp_path):
     found = read(file(tmp_path, text)).forward_speed
     assert np.allclose(found[TIME < 1], 2, atol=1e-6)
     assert np.isnan(found[TIME >= 1]).all()
+
+
+@pytest.mark.parametrize(
+    "stamp", ["2026-03-01T{0}", "2026-03-01 {0}", "2026-03-01T{0}Z", "2026-03-01T{0}+01:00", "{0}"]
+)
+def test_dates_and_times_of_day_are_seconds(tmp_path, stamp):
+    rows = lines_of("", GYRO, ACCEL).strip().splitlines()
+    times = [stamp.format(f"23:59:{56 + t:09.6f}") for t in TIME if t < 4] + [
+        stamp.replace("03-01", "03-02").format(f"00:00:{t - 4:09.6f}") for t in TIME if t >= 4
+    ]
+    text = "\n".join([OURS, *(f"{time},{row}" for time, row in zip(times, rows, strict=True))])
+    recording = read(file(tmp_path, text))
+    assert same(recording)
+    assert np.array_equal(recording.sample_index, np.arange(len(TIME)))  # over midnight, too
+
+
+def test_acceleration_without_gravity_is_not_taken_where_there_is_one_with_it(tmp_path):
+    header = "time,gx,gy,gz,Linear Acceleration x,Linear Acceleration y,Linear Acceleration z,ax,ay,az"
+    path = file(tmp_path, lines_of(header, TIME, GYRO, ACCEL - ACCEL.mean(axis=0), ACCEL))
+    assert same(read(path))
+    lonely = lines_of(",".join(header.split(",")[:7]) + " (m/s2)", TIME, GYRO, 0.1 * np.sin(ACCEL))
+    path = file(tmp_path, lonely.replace("tion x,", "tion x (m/s2),").replace("tion y,", "tion y (m/s2),"))
+    assert any("was gravity taken out" in note for note in read(path, columns=["gyro=gx,gy,gz:rad/s"]).notes)
 
 
 # Files of well-known devices
@@ -230,3 +256,49 @@ def test_files_of_phyphox_and_x_io_tell_their_units(tmp_path):
     recording = read(path, rate=100.0)
     assert same(recording)
     assert np.allclose(recording.mag, MAG, atol=1e-4)
+
+
+# Rows
+
+
+def test_rows_that_are_written_twice_count_once(tmp_path):
+    header, *rows = lines_of(OURS, TIME, GYRO, ACCEL).splitlines()
+    doubled = [row for i, row in enumerate(rows) for row in [row] * (1 + (i % 10 == 0))]
+    recording = read(file(tmp_path, "\n".join([header, *doubled])))
+    assert same(recording)
+    assert "80 rows repeat the row before them, time and all, and are left out" in recording.notes
+
+
+def test_equal_stamps_of_different_readings_are_samples_of_their_own(tmp_path):
+    recording = read(file(tmp_path, lines_of(OURS, TIME // 0.02 * 0.02, GYRO, ACCEL)))
+    assert same(recording)
+
+
+def test_counts_of_a_device_are_told_with_their_scale(tmp_path):
+    counts = (np.round(DEG * 131), np.round(ACCEL / GRAVITY * 16384))
+    path = file(tmp_path, lines_of("millis,gx,gy,gz,ax,ay,az", 1e3 * TIME, *counts, digits=0))
+    with pytest.raises(RecordingError, match="counts as g/16384"):
+        read(path, columns=["time=millis:ms"])
+    recording = read(path, columns=["time=millis:ms", "gyro=gx,gy,gz:deg/s/131", "accel=ax,ay,az:g/16384"])
+    assert same(recording, atol=0.5 / 131 * np.pi / 180)  # half a count; ten times that covers one of the accelerometer
+
+
+def test_angles_of_another_make_are_said_to_be_the_truth_and_their_unit_is_found(tmp_path):
+    roll, pitch, yaw = over_rows(euler_from_quaternion, MOTION["q_NS"]).T
+    header = "time,gyro_x,gyro_y,gyro_z,acc_x,acc_y,acc_z,roll,pitch,yaw"
+    path = file(tmp_path, lines_of(header, TIME, GYRO, ACCEL, *np.rad2deg([roll, pitch, yaw])))
+    recording = read(path)
+    np.testing.assert_allclose(recording.truth["roll"], roll, atol=1e-8)  # of seven digits in degrees
+    said = " ".join(recording.notes)
+    assert "roll, pitch, yaw are taken for the truth" in said and "roll is taken for deg" in said
+
+
+def test_a_magnetometer_in_unknown_units_keeps_its_direction(tmp_path):
+    header = "time,gyro_x,gyro_y,gyro_z,acc_x,acc_y,acc_z,mag_x,mag_y,mag_z"
+    recording = read(file(tmp_path, lines_of(header, TIME, GYRO, ACCEL, 1e-3 * MAG)))
+    lengths = np.linalg.norm(recording.mag, axis=1)
+    assert np.median(lengths) == pytest.approx(50)
+    np.testing.assert_allclose(
+        recording.mag / lengths[:, None], MAG / np.linalg.norm(MAG, axis=1)[:, None], atol=1e-5
+    )  # of 50 in seven digits, a thousandth of it written
+    assert any("nothing tells the unit of mag" in note for note in recording.notes)

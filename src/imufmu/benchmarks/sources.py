@@ -15,9 +15,9 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
-GROUPS_FILE = "trials.json"
-READ = (".csv", ".mat")
+from ..recordings.reading import KINDS
 
+GROUPS_FILE = "trials.json"
 Place = str | PathLike[str]
 
 
@@ -81,7 +81,7 @@ def _paths(place: Place) -> list[Path]:
     """Every recording of one place, sorted."""
     path = Path(place)
     if path.is_dir():
-        return sorted(p for p in path.rglob("*") if p.suffix.lower() in READ and p.is_file())
+        return sorted(p for p in path.rglob("*") if p.suffix.lower() in KINDS and p.is_file())
     if path.exists():
         return [path]
     if not has_magic(str(place)):
@@ -89,7 +89,7 @@ def _paths(place: Place) -> list[Path]:
     found = [Path(name) for name in sorted(glob(str(place), recursive=True))]
     if not found:
         raise ValueError(f"{place}: no file and no folder fits this pattern")
-    every = (_paths(p) if p.is_dir() else [p] * (p.suffix.lower() in READ) for p in found)
+    every = (_paths(p) if p.is_dir() else [p] * (p.suffix.lower() in KINDS) for p in found)
     return [p for some in every for p in some]
 
 

@@ -12,6 +12,7 @@ from math import pi
 from .vocabulary import GRAVITY
 
 _DEGREE = pi / 180
+_NUMBER = r"\d+\.?\d*(?:e[-+]?\d+)?|\.\d+(?:e[-+]?\d+)?"
 _FACTORS: dict[str, dict[str, float]] = {
     "s": {"s": 1.0, "seconds": 1.0, "second": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0},
     "rad/s": {
@@ -37,8 +38,23 @@ _SPELLINGS = (
 
 
 def factor(text: str, unit: str) -> float | None:
-    """What a number in the unit ``text`` is multiplied with to be one in ``unit``, a unit of ours; None if unknown."""
+    """What a number in the unit ``text`` is multiplied with to be one in ``unit``, a unit of ours; None if unknown.
+
+    A unit may be a part or a multiple of another, as the counts of a device are: ``g/16384``, ``0.061 mg``.
+    """
     plain = re.sub(r"seconds?", "s", text.strip().lower())
+    if not plain:
+        return _FACTORS[unit].get("")
+    if (known := _factor(plain, unit)) is not None:
+        return known
+    scaled = re.fullmatch(rf"(?:({_NUMBER})\s*\*?\s*)?(.+?)(?:\s*/\s*({_NUMBER}))?", plain)
+    known = _factor(scaled[2], unit) if scaled else None
+    if scaled is None or known is None or float(scaled[3] or 1) == 0:
+        return None
+    return float(scaled[1] or 1) * known / float(scaled[3] or 1)
+
+
+def _factor(plain: str, unit: str) -> float | None:
     for spelling, ours in _SPELLINGS:
         plain = plain.replace(spelling, ours)
     return _FACTORS[unit].get(plain)

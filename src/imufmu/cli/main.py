@@ -16,8 +16,10 @@ from ..cosim.interrupt import clean_up_when_asked_to_end
 from .connecting import connect
 from .console import err, out, show_what_can_be_shown
 from .fmus import build, doctor, info
+from .inspecting import inspect
 from .listing import list_
-from .runs import demo, pack, replay, run
+from .replaying import replay
+from .runs import demo, pack, run
 from .speed import speed
 from .verdicts import benchmark, predict, validate
 
@@ -34,6 +36,7 @@ EXAMPLES = """IMU attitude estimators as drop-in FMUs, with the plants and IMU m
   imufmu run pendulum_swing_up --report swing_up.html --animate swing_up.gif
   imufmu connect plant.fmu --out my.ssd         wires your own plant to an IMU and estimators
   imufmu replay walk.csv --estimator lee2012 --set c_a=0.2 --output tilt.csv
+  imufmu inspect log.txt                        what is in a recording, its rate, gaps, units and axes
   imufmu pack pendulum_lee2012 pendulum.ssp     for other tools
   imufmu validate --junit verdict.xml           do the papers' conclusions hold?
   imufmu benchmark broad                        every filter on a folder of recordings
@@ -61,7 +64,7 @@ def _root(version: Annotated[bool, typer.Option("--version", help="Print the ver
 
 
 app.command("list")(list_)
-for verb in (build, doctor, info, run, connect, replay, pack, demo, validate, benchmark, speed, predict):
+for verb in (build, doctor, info, connect, run, replay, inspect, pack, demo, validate, benchmark, speed, predict):
     app.command()(verb)
 
 

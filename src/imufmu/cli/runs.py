@@ -1,4 +1,4 @@
-"""The verbs that run something: run, replay, pack, demo."""
+"""The verbs that run systems: run, pack, demo."""
 
 from __future__ import annotations
 
@@ -137,68 +137,6 @@ def run(
         with progress_bar(f"drawing {animation.name}") as progress:
             notes(animate(result, animation, progress))
         written(None if json else animation)
-
-
-def replay(
-    recording: Annotated[Path, typer.Argument(help="Recording: .csv in SI units, or a BROAD .mat file")],
-    estimator: Annotated[
-        str, typer.Option("--estimator", "-e", help="Name of an estimator, or an .fmu file.")
-    ] = "lee2012",
-    sets: Sets = None,
-    native: Native = False,
-    output: Output = None,
-    in_process: InProcess = False,
-    step_timeout: StepTimeout = STEP_TIMEOUT,
-    rate: Annotated[
-        float | None, typer.Option("--rate", help="Samples per second of a .csv whose times are not to be used.")
-    ] = None,
-    local_variables: Annotated[bool, typer.Option("--locals", help="Also write the FMU's local variables.")] = False,
-    offline: Annotated[
-        bool, typer.Option("--offline", help="Use the whole recording for every row: forward and backward, no FMU.")
-    ] = False,
-    plot: Plot = False,
-) -> None:
-    """Feed a recording to an estimator FMU, one step per sample.
-
-    \b
-      imufmu replay walk.csv --estimator lee2012 --set c_a=0.2 --output tilt.csv --plot
-      imufmu replay 01_undisturbed_slow_rotation_A.mat --estimator my_filter.fmu
-      imufmu replay bunched_stamps.csv --rate 200 --output tilt.h5
-      imufmu replay walk.csv --estimator plumb --offline
-
-    A CSV file names its columns time, gyro[1], gyro[2], gyro[3], accel[1], accel[2], accel[3] and, where there are
-    such, mag[1], mag[2], mag[3], forward_speed and the truth: roll, pitch, yaw or q_NS[1] to q_NS[4]. Units: s, rad/s,
-    m/s2, uT, m/s, rad. Inputs of the FMU that the file does not have stay at their start values; a note tells. With a
-    truth the errors are printed.
-    """
-    from ..cosim.offline import replay_offline
-    from ..cosim.replay import estimator_fmu
-    from ..cosim.replay import replay as replay_recording
-    from ..recordings.reading import read
-    from ..reports.present import present_replay
-
-    check_target(output, ".csv", ".h5", inputs=[recording, estimator])
-    read_recording = read(recording, rate)
-    with kept(output), progress_bar(f"replaying {read_recording.name}") as progress:
-        if offline:
-            result = replay_offline(read_recording, estimator, parsed_sets(sets))
-        else:
-            result = replay_recording(
-                read_recording,
-                estimator_fmu(estimator, native=native),
-                parsed_sets(sets),
-                local_variables=local_variables,
-                in_process=in_process,
-                step_timeout=step_timeout,
-                progress=progress,
-            )
-    save(result, output)
-    figure = Path(f"{read_recording.name}_{result.estimator}.png") if plot else None
-    notes(result.notes)
-    table, not_compared = present_replay(result, figure)
-    notes(not_compared)
-    print_table(table)
-    written(output, figure)
 
 
 def pack(

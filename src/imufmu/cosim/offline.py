@@ -10,9 +10,10 @@ import numpy as np
 from ..blocks.block import SampledBlock
 from ..compiled.offline import run_offline
 from ..files.names import no_such
+from ..recordings.checks import axes_doubts
 from ..recordings.reading import Recording
 from ..registry import ESTIMATORS
-from .replay import Replay
+from .replay import Replay, in_axes_of
 from .units import Unit, quantity
 
 
@@ -35,7 +36,9 @@ def replay_offline(recording: Recording, name: str, parameters: Mapping[str, Any
         rows = values[recording.sample_index]
         parts = {signal_name: rows} if rows.ndim == 1 else {f"{signal_name}[{i + 1}]": rows[:, i] for i in range(3)}
         columns |= parts
-    return Replay(recording, name, columns, {c: units[c.split("[")[0]] for c in columns}, recording.notes)
+    notes = (*recording.notes, *axes_doubts(recording))
+    of_columns = {column: units[column.split("[")[0]] for column in columns}
+    return Replay(recording, name, in_axes_of(recording, columns, of_columns), of_columns, notes)
 
 
 def _in_unit(block: SampledBlock, name: str, value: Any) -> Any:

@@ -19,6 +19,7 @@ from ..fmi.archive import read_fmu
 from ..fmi.build import cached_fmu
 from ..fmi.native import cached_native_fmu
 from ..fmi.own import is_ours
+from ..recordings.checks import axes_doubts
 from ..recordings.reading import Recording, hold_missing
 from ..registry import BLOCKS, ESTIMATORS
 from .apart import Instance, Instances
@@ -56,11 +57,11 @@ class Replay(Tabular):
 
     def signals(self) -> dict[str, np.ndarray]:
         """Columns as signals: roll (n,), vertical (n, 3), ..."""
-        parts: dict[str, list[np.ndarray]] = {}
-        for name, values in self.columns.items():
-            parts.setdefault(name.split("[")[0], []).append(values)
-        vectors = {name.split("[")[0] for name in self.columns if "[" in name}
-        return {name: np.column_stack(part) if name in vectors else part[0] for name, part in parts.items()}
+        return _signals(self.columns)
+
+    def truth(self) -> dict[str, np.ndarray]:
+        """What the file knows, in the axes of the estimates: those of the file."""
+        return self.recording.axes.from_ours(self.recording.truth)
 
     def __repr__(self) -> str:
         return f"<Replay of {self.recording.name!r} through {self.estimator}: {len(self.columns)} variables>"
@@ -84,6 +85,29 @@ class Replay(Tabular):
     def _time(self) -> np.ndarray:
         rows = min((len(column) for column in self.columns.values()), default=len(self.recording.time))
         return self.recording.time[:rows]
+
+
+def _signals(columns: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+    parts: dict[str, list[np.ndarray]] = {}
+    for name, values in columns.items():
+        parts.setdefault(name.split("[")[0], []).append(values)
+    vectors = {name.split("[")[0] for name in columns if "[" in name}
+    return {name: np.column_stack(part) if name in vectors else part[0] for name, part in parts.items()}
+
+
+def in_axes_of(recording: Recording, columns: dict[str, np.ndarray], units: Mapping[str, str]) -> dict[str, np.ndarray]:
+    """Estimates (n,) by variable name in the axes of the recording's file, and not in ours. units: by variable name."""
+    if recording.axes.are_ours:
+        return columns
+    scales = {name: np.pi / 180 for name in ("roll", "pitch", "yaw") if units.get(name) == "deg"}
+    turned = recording.axes.from_ours(_signals({name: scales.get(name, 1) * c for name, c in columns.items()}))
+    flat = dict(columns)
+    for name, values in turned.items():
+        if values.ndim == 1:
+            flat[name] = values / scales.get(name, 1)
+        elif f"{name}[1]" in columns:
+            flat |= {f"{name}[{i + 1}]": values[:, i] for i in range(values.shape[1])}
+    return flat
 
 
 def estimator_fmu(name: str, *, native: bool = False) -> Path:
@@ -129,12 +153,13 @@ def replay(
     def result(partial: str = "") -> Replay:
         rows = np.searchsorted(recording.sample_index, run.done)
         at_rows = run.rows[recording.sample_index[:rows]]
+        units = {v.name: unit_of(v) or "" for v in reported}
         return Replay(
             recording,
             interface.component,
-            {v.name: at_rows[:, i] for i, v in enumerate(reported)},
-            {v.name: unit_of(v) or "" for v in reported},
-            (*recording.notes, *notes),
+            in_axes_of(recording, {v.name: at_rows[:, i] for i, v in enumerate(reported)}, units),
+            units,
+            (*recording.notes, *axes_doubts(recording), *notes),
             f"{rows} of {len(recording.time)} rows: {partial}" if partial else "",
         )
 

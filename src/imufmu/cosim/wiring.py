@@ -173,9 +173,9 @@ class _Checks:
             if are_real and same_units and (units[0] is None) != (units[1] is None):
                 names = " -> ".join(label(*end) for end in ends)
                 pairs.setdefault((way[0][0], way[-1][0]), []).append(names)
-        for names in pairs.values():
-            more = f" and {len(names) - _TOLD} more" if len(names) > _TOLD else ""
-            told = ", ".join(names[:_TOLD])
+        for links in pairs.values():
+            more = f" and {len(links) - _TOLD} more" if len(links) > _TOLD else ""
+            told = ", ".join(links[:_TOLD])
             self.notes.append(f"{told}{more}: one end does not name its unit; taken for the same")
 
     def note_shifted_index(self, way: Sequence[Node]) -> None:

@@ -24,11 +24,24 @@ OWN = {TIME: (TIME,), VALID: (VALID,)} | {name: tuple(signal.element_names()) fo
 
 # Stems of names, in plain letters, that others give to a signal; the axis follows.
 _STEMS = {
-    "gyro": ("gyro", "gyroscope", "gyr", "angularvelocity", "angularrate", "rotationrate", "omega", "w", "g", "rate"),
+    "gyro": (
+        "gyro",
+        "gyroscope",
+        "gyr",
+        "angularvelocity",
+        "angularrate",
+        "rotationrate",
+        "gyrorotation",
+        "omega",
+        "w",
+        "g",
+        "rate",
+    ),
     "accel": ("accel", "accelerometer", "acc", "acceleration", "specificforce", "linearacceleration", "a", "f"),
     "mag": ("mag", "magnetometer", "magneticfield", "magn", "m"),
 }
 _TIMES = ("time", "timestamp", "t", "stamp", "secondselapsed", "elapsed", "elapsedtime", "timestampsample")
+_WITHOUT_GRAVITY = ("linear", "user", "free")  # ends of what stands before such an acceleration
 _SHORT = {"w", "g", "a", "f", "m", "t", "rate"}
 # Ends of names that are units: acc_x_g, gyro_x_dps, time_ms.
 _UNIT_ENDS = r"_(dps|deg_?s|deg_per_s|rad_?s|rad_per_s|radps|g|mg|m_?s2|mps2|ut|gauss|ms|us|ns|s|sec)$"
@@ -112,7 +125,9 @@ def recognised_columns(names: Sequence[str]) -> tuple[dict[str, Choice], list[st
     found, doubts = {}, []
     for signal in _STEMS:
         sets = []
-        for prefix in dict.fromkeys(key[0] for key in by_axis):
+        prefixes = dict.fromkeys(key[0] for key in by_axis if key[1] == signal)
+        with_gravity = [prefix for prefix in prefixes if not prefix.endswith(_WITHOUT_GRAVITY)]
+        for prefix in with_gravity or prefixes:
             axes = [by_axis.get((prefix, signal, axis), []) for axis in "xyz"]
             if all(len(axis) == 1 for axis in axes):
                 sets.append(Choice(tuple(axis[0][0] for axis in axes), axes[0][0][1]))

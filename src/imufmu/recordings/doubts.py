@@ -18,6 +18,7 @@ def doubts(
     found = [f"{name} has no complete sample" for name, length in usual.items() if np.isnan(length)]
     if usual["accel"] < 5 or usual["accel"] > 20:
         hint = "; are the values in g?" if 0.5 < usual["accel"] < 2 else ""
+        hint += "; was gravity taken out of them? Estimators of tilt need it" if usual["accel"] < 2 else ""
         found.append(f"accel has a median length of {usual['accel']:.3g} m/s2, far from gravity{hint}")
     fast = _typical_length(readings["gyro"], 0.99)
     if fast > 20:

@@ -45,6 +45,11 @@ def read_folder(path: Path, rate: float | None, columns: Columns) -> Raw:
         return _read(path, _known(Path(scratch)), rate)
 
 
+def is_recording_folder(folder: Path) -> bool:
+    """Whether a folder holds the files of one recording, and is no folder of recordings."""
+    return bool({"Gyroscope", "Inertial"} & _known(folder).keys())
+
+
 def _known(folder: Path) -> dict[str, Path]:
     """Files of known names, by the name without .csv."""
     return {name: file for name in _FILES if (file := folder / f"{name}.csv").is_file()}

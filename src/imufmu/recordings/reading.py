@@ -39,11 +39,12 @@ from .text_reading import read_text
 from .told import Told, recall
 
 TEXTS = (".csv", ".txt", ".tsv", ".dat", ".log")
+KINDS = (*TEXTS, ".zip", *LOGS, ".mat")  # ends of names of what is read
 _READINGS = (v.GYRO.name, v.ACCEL.name, v.MAG.name, v.FORWARD_SPEED.name)
 _TRUTH = (v.Q_NS.name, v.ROLL.name, v.PITCH.name, v.YAW.name)
 _PERIOD_BOUNDS = v.sample_period(0.01)
 
-__all__ = ["Recording", "RecordingError", "hold_missing", "read"]
+__all__ = ["Recording", "RecordingError", "hold_missing", "is_recording", "read", "recordings_in"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,6 +150,19 @@ def read(
     return _recording(path, raw, turned, [*notes, *raw.notes])
 
 
+def is_recording(path: Path) -> bool:
+    """Whether a file has the name of a recording: what ``read`` would not refuse for its name alone."""
+    return is_log(path) or (path.is_file() and path.suffix.lower() in KINDS)
+
+
+def recordings_in(folder: Path) -> list[Path]:
+    """Every file in a folder that is read as a recording. Raises RecordingError if there is no such folder."""
+    try:
+        return sorted(path for path in folder.iterdir() if is_recording(path))
+    except OSError as error:
+        raise RecordingError(f"{folder}: cannot list the folder: {error.strerror}") from None
+
+
 def _reader(path: Path) -> Callable[[Path, Told], Raw]:
     """What reads a file of this kind. Raises RecordingError."""
     suffix = path.suffix.lower()
@@ -160,8 +174,8 @@ def _reader(path: Path) -> Callable[[Path, Told], Raw]:
         return lambda path, told: read_text(path, told.rate, told.columns)
     if suffix == ".mat":
         return lambda path, told: read_broad(path)
-    kinds = ", ".join((*TEXTS, ".zip", *LOGS))
-    raise RecordingError(f"{path}: cannot read {suffix or 'a file without suffix'}; use {kinds}, or .mat for BROAD")
+    kinds = ", ".join(KINDS)
+    raise RecordingError(f"{path}: cannot read {suffix or 'a file without suffix'}; use {kinds} (of BROAD)")
 
 
 def _recording(path: Path, raw: Raw, axes: Axes, notes: Sequence[str]) -> Recording:

@@ -69,9 +69,7 @@ def _unit(stamps: np.ndarray, unit: str | None, notes: list[str]) -> float:
     known = factor(unit, "s") if unit else None
     if known is not None:
         return known
-    steps = np.diff(stamps)
-    increasing = steps[steps > 0]
-    usual = float(np.mean(np.clip(steps, 0, 50 * np.median(increasing)))) if increasing.size else 0.0
+    usual = _mean_step(np.diff(stamps))
     if usual < _SLOWEST:
         return 1.0
     for name, seconds, most in (("milliseconds", 1e-3, 1e3), ("microseconds", 1e-6, 1e6), ("nanoseconds", 1e-9, 1e9)):
@@ -79,6 +77,11 @@ def _unit(stamps: np.ndarray, unit: str | None, notes: list[str]) -> float:
             notes.append(f"times are taken for {name}, as rows are {usual:g} apart; another unit: --time NAME:s")
             return seconds
     return 1.0
+
+
+def _mean_step(steps: np.ndarray) -> float:
+    """Mean of the intervals without the few longest, and whatever comes together."""
+    return float(np.mean(np.clip(steps, 0, 2 * np.quantile(steps, 0.99, method="lower")))) if len(steps) else 0.0
 
 
 def _unwrapped(stamps: np.ndarray, notes: list[str]) -> np.ndarray:
@@ -100,19 +103,20 @@ def _unwrapped(stamps: np.ndarray, notes: list[str]) -> np.ndarray:
 def _continued(time: np.ndarray, notes: list[str]) -> np.ndarray:
     """Time without the jumps of a clock that was set. Raises ClockError where two recordings are in one file."""
     steps = np.diff(time)
-    usual = np.median(steps[steps > 0]) if (steps > 0).any() else 0.0
-    jumps = np.flatnonzero((steps < -5 * usual) | (steps > _SET))
-    if not jumps.size or not usual or jumps.size > 10 or len(time) / (jumps.size + 1) < _REGULAR:
+    typical = _mean_step(steps)
+    jumps = np.flatnonzero((steps < -20 * typical) | (steps > _SET))  # packets that overtake each other are no jump
+    if not jumps.size or jumps.size > 10 or len(time) / (jumps.size + 1) < _REGULAR:
         return time
     ends = [-1, *jumps.tolist(), len(time) - 1]
     if min(np.diff(ends)) < _REGULAR:
         return time
     moved = time.copy()
+    kept = float(np.median(np.delete(steps, jumps)))
     for at in jumps.tolist():
         jump = steps[at]
-        if jump < 0 and abs(time[at + 1] - time[0]) <= 2 * usual:
+        if jump < 0 and abs(time[at + 1] - time[0]) <= 2 * typical:
             raise ClockError(at + 1, f"{time[at + 1]:g} s: time begins anew: two recordings in one file? split them")
-        moved[at + 1 :] -= jump - usual
+        moved[at + 1 :] -= jump - kept
         notes.append(
             f"the clock jumps by {jump:g} s after sample {at + 1}: taken for a clock that was set, with no sample lost"
         )
@@ -151,6 +155,8 @@ def _arrivals(time: np.ndarray) -> Clock | None:
     if index[-1] + 1 > 3 * n:
         return None
     missing = int(index[-1]) + 1 - n
+    last = np.flatnonzero(np.append(np.diff(time) > 0.6 * period, True))
+    period = plainest(float(np.polyfit(index[last], time[last] - time[0], 1)[0]), 5e-4 * period)
     note = (
         f"times do not tell the samples apart (equal, crowded or in bunches of {window}): rows are taken for evenly "
         f"spaced at their mean rate, {1 / period:.6g} Hz" + (f", {missing} missing" if missing else "")

@@ -23,7 +23,10 @@ _USUAL: Mapping[str, Mapping[str, tuple[float, float]]] = {
     "accel": {"m/s2": (5, 20), "g": (0.5, 2), "mg": (500, 2000)},
     "mag": {"uT": (10, 150), "gauss": (0.1, 1.5), "mG": (150, 1500), "nT": (1e4, 1.5e5)},
 }
+_TRUTH = ("q_NS", "roll", "pitch", "yaw")
+_GUESSED = (*_USUAL, "roll", "pitch", "yaw")
 _FASTEST = 35.0  # rad/s; gyroscopes for hands and vehicles end there, at 2000 deg/s
+_LARGEST_ANGLE = 6.5  # rad
 
 # A magnetometer in units of the field of its place, as Xsens and Shimmer write it.
 _LOCAL_FIELD = 50.0  # uT
@@ -91,12 +94,12 @@ def _chosen(
         notes.append(f"read as a file of {preset.name}: " + _told(found) + (f"; {preset.note}" if preset.note else ""))
     else:
         found, doubts = recognised_columns(table.names)
-        guessed = {
-            signal for signal, choice in found.items() if choice.unit is None and signal in ("gyro", "accel", "mag")
-        }
-        shown = {s: c for s, c in found.items() if s not in told and tuple(OWN[s]) != c.names}
+        guessed = {signal for signal, choice in found.items() if choice.unit is None and signal in _GUESSED}
+        shown = {s: c for s, c in found.items() if s not in told and (OWN[s] != c.names or s in _TRUTH)}
         if shown:
-            notes.append("columns by their names: " + _told(shown))
+            truth = [signal for signal in _TRUTH if signal in shown]
+            as_truth = f"; {', '.join(truth)} are taken for the truth" if truth else ""
+            notes.append("columns by their names: " + _told(shown) + as_truth)
     if TIME in told:
         tick = None
     guessed -= set(told)
@@ -115,10 +118,8 @@ def _told(columns: Columns) -> str:
 def _check_own(table: TextTable, found: dict[str, Choice], told: Columns, timed: bool) -> None:
     """Raises RecordingError with every problem of a header with names of ours."""
     names, problems = table.names, []
-    for signal, choice in found.items():
+    for choice in found.values():
         problems += [f"column {n!r} appears {names.count(n)} times" for n in choice.names if names.count(n) > 1]
-        if signal not in told and set(choice.names) - set(names):
-            found[signal] = choice
     if problems:
         raise RecordingError(f"{table.path}, line {table.header_line}: " + "; ".join(problems))
     wanted = [s for s in (*REQUIRED, *([TIME] if timed else [])) if s not in told]
@@ -229,24 +230,30 @@ def _factors(
     return np.array(found)
 
 
+@np.errstate(over="ignore", invalid="ignore")
 def _guessed(
     table: TextTable, choice: Choice, signal: str, raw: Mapping[str, np.ndarray], clock: Clock, notes: list[str]
 ) -> float:
     """Factor of a reading whose unit nobody has told, from its values, with a note. Raises RecordingError."""
     length = np.linalg.norm(raw[signal], axis=1)
     typical = float(np.median(length[np.isfinite(length)])) if np.isfinite(length).any() else np.nan
-    unit = next((u for u, (least, most) in _USUAL[signal].items() if least <= typical <= most), None)
-    if signal == "gyro":
+    unit = next((u for u, (least, most) in _USUAL.get(signal, {}).items() if least <= typical <= most), None)
+    if signal in _TRUTH:  # told for all angles together: small ones say nothing
+        angles = [np.nanmax(np.abs(raw[name]), initial=0.0) for name in _TRUTH[1:] if name in raw]
+        unit = "deg" if max(angles) > _LARGEST_ANGLE else "rad"
+    elif signal == "mag" and unit is None:
+        notes.append(f"nothing tells the unit of mag: its median length is taken for {_LOCAL_FIELD:g} uT")
+        return _LOCAL_FIELD / typical if typical > 0 else 1.0
+    elif signal == "gyro":
         place = best_scale(raw["gyro"], raw["accel"], clock.index, clock.period, (1.0, DEGREE))
         fast = np.nanquantile(length, 0.99) > _FASTEST if np.isfinite(length).any() else False
         unit = ("rad/s", "deg/s")[place] if place >= 0 else "deg/s" if fast else None
     said = f"{signal} is taken for {unit}, as its values tell; another unit: --columns {signal}=...:UNIT"
     if unit is None:
-        units = "deg/s" if signal == "gyro" else ", ".join(spellings(UNITS[signal]))
+        units = {"gyro": "deg/s; counts as deg/s/131", "accel": "g, mg; counts as g/16384"}[signal]
         raise RecordingError(
             f"{table.path}: neither the header nor the values tell the unit of {signal}: tell it with its columns, as "
             f"--columns {signal}={choice.text()}:{UNITS[signal]} (or {units})"
         )
-    if said not in notes:
-        notes.append(said)
+    notes += [said] if said not in notes else []
     return factor(unit, UNITS[signal]) or 1.0

@@ -14,6 +14,7 @@ import itertools
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
+from datetime import UTC, datetime
 from pathlib import Path
 
 import numpy as np
@@ -23,6 +24,7 @@ from .faults import RecordingError, listed
 
 _LOOKED_AT = 200  # lines at most before the first sample
 _SAMPLES = 8  # rows that are looked at
+_NO_TEXT = "not a text file; save the table as CSV in UTF-8"
 _COMMENT = ("#", "//", "%")
 _SEPARATORS = ",;\t|"
 _NUMBER = r"[-+]?(\d+([.,]\d*)?|[.,]\d+)([eE][-+]?\d+)?"
@@ -80,17 +82,17 @@ class TextTable:
 
     def _rows(self) -> Iterator[tuple[int, list[str]]]:
         with open(self.path, newline="", encoding=self.encoding) as file:
-            for _ in range(self.first_row):
-                file.readline()
-            reader = _reader(file, self.separator)
             line = self.first_row + 1
             try:
+                for _ in range(self.first_row):
+                    file.readline()
+                reader = _reader(file, self.separator)
                 for cells in reader:
                     if cells and not cells[0].lstrip().startswith(_COMMENT):
                         yield line, cells
                     line = self.first_row + reader.line_num + 1
             except UnicodeDecodeError:
-                raise RecordingError(f"{self.path}: not a text file; save the table as CSV in UTF-8") from None
+                raise RecordingError(f"{self.path}: {_NO_TEXT}") from None
             except csv.Error as error:
                 raise RecordingError(f"{self.path}, after line {line}: not a CSV table: {error}") from None
 
@@ -101,6 +103,8 @@ class TextTable:
         except ValueError:
             if text.lower() in ("na", "n/a", "null", "none", "-"):
                 return np.nan
+            if (seconds := _seconds(text)) is not None:
+                return seconds
             raise RecordingError(
                 f"{self.path}, line {line}, column {self.full_names[place]!r}: {listed([cell])} is not a number"
             ) from None
@@ -109,12 +113,17 @@ class TextTable:
 def read_table(path: Path) -> TextTable:
     """Look at the first lines of a text file. Raises RecordingError and OSError."""
     encoding = _encoding(path)
-    with open(path, newline="", encoding=encoding) as file:
-        head = list(itertools.islice(file, _LOOKED_AT))
+    try:
+        with open(path, newline="", encoding=encoding) as file:
+            head = list(itertools.islice(file, _LOOKED_AT))
+    except UnicodeDecodeError:
+        raise RecordingError(f"{path}: {_NO_TEXT}") from None
     if any(len(line) > csv.field_size_limit() for line in head):
         raise RecordingError(f"{path}, line 1: not a CSV table: a line of {max(map(len, head))} characters")
     lines = [line.strip("\r\n") for line in head]
-    told = next((match[1] for line in lines[:3] if (match := re.fullmatch(r'"?sep=(.)"?,*', line.strip()))), None)
+    told = next(
+        (match[1] for line in lines[:3] if (match := re.fullmatch(r'"?sep=([,;|\t ])"?,*', line.strip("\ufeff")))), None
+    )
     separator = told or _separator(lines)
     header, units_row, first = _layout(lines, separator)
     width = len(_cells(lines[first], separator)) if first < len(lines) else 0
@@ -154,6 +163,18 @@ def read_table(path: Path) -> TextTable:
     )
 
 
+def _seconds(text: str) -> float | None:
+    """Seconds since 1970 of a date with a time, since midnight of a time; None for what is neither."""
+    try:
+        if re.match(r"\d+-\d+-\d+[T ]", text):
+            date = datetime.fromisoformat(text)
+            return (date if date.tzinfo else date.replace(tzinfo=UTC)).timestamp()
+        time = datetime.fromisoformat(f"1970-01-01T{text}+00:00") if re.match(r"\d+:\d+:\d+", text) else None
+    except (ValueError, OverflowError):
+        return None
+    return time.timestamp() if time else None
+
+
 def _encoding(path: Path) -> str:
     """By the marks at its start, else UTF-8, else Western European. Raises RecordingError for what is no text."""
     with open(path, "rb") as file:
@@ -176,7 +197,7 @@ def _encoding(path: Path) -> str:
             fits = "latin-1"
     unusual = sum(byte > 127 for byte in start) if fits != "utf-8-sig" else 0
     if controls or unusual > len(start) / 50 + 12:
-        raise RecordingError(f"{path}: not a text file; save the table as CSV in UTF-8")
+        raise RecordingError(f"{path}: {_NO_TEXT}")
     return fits
 
 

@@ -24,6 +24,7 @@ _FEWEST = 3  # windows
 # has 4 to 12 times that of the right one where there is turning about it.
 _CLEARLY_LESS = 0.4
 _SEEN = 0.003  # incoherence below which there was too little turning to tell, or nothing is wrong
+_FINALISTS = 24  # candidates that are tried on all windows
 _ALIKE = 0.05  # of the way from the best to the readings as they are
 
 DEGREE = np.pi / 180
@@ -51,6 +52,7 @@ class Turning:
         return self.scale == 1 and bool((self.matrix == np.eye(3)).all())
 
 
+@np.errstate(over="ignore", invalid="ignore")  # of absurd values nothing is told
 def turning(gyro: np.ndarray, accel: np.ndarray, index: np.ndarray, period: float) -> Turning:
     """Readings (n, 3), rad/s and any unit, their whole-number instants (n,) and the sample period (s)."""
     unknown = Turning(np.eye(3), 1.0, False)
@@ -58,20 +60,25 @@ def turning(gyro: np.ndarray, accel: np.ndarray, index: np.ndarray, period: floa
     if windows is None:
         return unknown
     as_is = float(_incoherences([np.eye(3)], *windows)[0])
+    opposite = float(_incoherences([-np.eye(3)], *windows)[0])
+    as_they_are = Turning(np.eye(3), 1.0, as_is < _CLEARLY_LESS * opposite and opposite > _SEEN)
     if as_is < _SEEN:
-        opposite = float(_incoherences([-np.eye(3)], *windows)[0])
-        return Turning(np.eye(3), 1.0, opposite > 2 * as_is + _SEEN)
+        return as_they_are
     tried = [(1.0, m) for m in _PERMUTATIONS] + [(s, np.eye(3)) for s in (0.5, 2.0)]
     tried += [(s, m) for s in (DEGREE, 1 / DEGREE) for m in _PERMUTATIONS]
+    rates, forces, step = windows
+    roughly = _incoherences([scale * m for scale, m in tried], rates[::4], forces[::4], step)
+    tried = [tried[i] for i in np.argsort(roughly)[:_FINALISTS]]
     found = _incoherences([scale * m for scale, m in tried], *windows)
     best = float(found.min())
     if best > _CLEARLY_LESS * as_is:
-        return Turning(np.eye(3), 1.0, as_is < 0.3)
+        return as_they_are
     alike = [candidate for candidate, left in zip(tried, found, strict=True) if left <= best + _ALIKE * (as_is - best)]
     scale, matrix = min(alike, key=_oddness)
     return Turning(matrix, scale, True)
 
 
+@np.errstate(over="ignore", invalid="ignore")
 def best_scale(gyro: np.ndarray, accel: np.ndarray, index: np.ndarray, period: float, scales: Sequence[float]) -> int:
     """Place of the factor of the gyroscope that fits much better than the others, -1 where none does."""
     windows = _windows(gyro, accel, index, period)

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+
+import numpy as np
 
 from ..blocks.running import Trajectory
 from ..cosim.replay import Replay
@@ -90,28 +93,49 @@ def present_replay(replay: Replay, figure: Path | None = None) -> tuple[Table, l
 
     Writes a figure where a path is given. Raises WriteError.
     """
-    recording, signals = replay.recording, replay.signals()
+    return present_replays([replay], figure)
+
+
+def present_replays(replays: Sequence[Replay], figure: Path | None = None) -> tuple[Table, list[str]]:
+    """The same of several replays of one recording, side by side; without a truth, how far they are from the first."""
+    recording = replays[0].recording
     scored, notes = recording.scored, []
-    errors = {}
-    if scored.any() and recording.truth.keys() & signals.keys():
-        estimated, true = (metrics.at_rows(some, scored) for some in (signals, recording.truth))
-        notes = leave_out_unequal(estimated, true, replay.estimator, recording.name)
+    errors: dict[str, dict[str, np.ndarray]] = {}
+    figures: dict[str, dict[str, float]] = {}
+    truth = replays[0].truth()
+    for replay in replays:
+        signals = replay.signals()
+        if not scored.any() or not truth.keys() & signals.keys():
+            continue
+        estimated, true = (metrics.at_rows(some, scored) for some in (signals, truth))
+        notes += leave_out_unequal(estimated, true, replay.estimator, recording.name)
         try:
-            errors = metrics.errors(estimated, true)
-            figures = metrics.summary(errors)
+            found = metrics.errors(estimated, true)
+            figures[replay.estimator] = metrics.summary(found)
+            errors[replay.estimator] = found
         except ValueError as error:
-            errors = {}
             notes.append(f"{replay.estimator} is not compared with the truth: {error}")
     if figure:
-        estimate = Trajectory(recording.time, signals)
-        truth = Trajectory(recording.time, recording.truth) if recording.truth else None
         drawn = attitude_figure(
             recording.name,
-            truth,
-            {replay.estimator: estimate},
-            {replay.estimator: (recording.time[scored], errors)} if errors else {},
+            Trajectory(recording.time, truth) if truth else None,
+            {replay.estimator: Trajectory(recording.time, replay.signals()) for replay in replays},
+            {name: (recording.time[scored], found) for name, found in errors.items()},
         )
         save(drawn, figure)
-    if errors:
-        return summary_table("estimator", {replay.estimator: figures}), notes
-    return range_table(replay.columns, replay.units), notes
+    if figures:
+        return summary_table("estimator", figures), notes
+    if len(replays) > 1:
+        return _apart_table(replays), notes
+    return range_table(replays[0].columns, replays[0].units), notes
+
+
+def _apart_table(replays: Sequence[Replay]) -> Table:
+    """How far the verticals of the estimators are from that of the first which has one."""
+    verticals = {r.estimator: r.signals()["vertical"] for r in replays if "vertical" in r.signals()}
+    first = next(iter(verticals), "")
+    rows = []
+    for name, vertical in verticals.items():
+        apart = np.rad2deg(metrics.inclination_error(vertical, verticals[first]))
+        rows.append([name, f"{metrics.rms(apart):.3f}", f"{apart.max():.3f}"])
+    return Table(["estimator", f"tilt from {first}: RMS (deg)", "max (deg)"], rows)

@@ -35,7 +35,7 @@ def read_sources(path: Path) -> tuple[list[Source], list[str]]:
                 rows.setdefault((kind, instance), []).append(row)
     except Exception as error:  # a damaged log raises whatever the library stumbles over
         raise damaged(path, "a log of ArduPilot", error) from None
-    notes = ["axes of ArduPilot: x forward, y right, z down"] if rows else []
+    notes = ["axes of ArduPilot: x forward, y right, z down; with --axes NED angles are as there"] if rows else []
     return [_source(*key, np.array(table)) for key, table in sorted(rows.items())], notes
 
 

@@ -46,7 +46,11 @@ def read_sources(path: Path) -> tuple[list[Source], list[str]]:
         sources = [_source(data, instances[data.name] > 1) for data in topics]
     except Exception as error:  # a damaged log raises whatever the library stumbles over
         raise damaged(path, "a log of PX4", error) from None
-    notes = ["axes of PX4: x forward, y right, z down"] if instances["sensor_combined"] else []
+    notes = (
+        ["axes of PX4: x forward, y right, z down; with --axes NED angles are as there"]
+        if instances["sensor_combined"]
+        else []
+    )
     if log.file_corruption:
         notes.append("the log is damaged in places, which were skipped")
     if log.dropouts:
