@@ -13,6 +13,7 @@ import typer
 from .. import __version__
 from ..cosim.errors import SimulationError
 from ..cosim.interrupt import clean_up_when_asked_to_end
+from .checking import check
 from .console import err, out, show_what_can_be_shown
 from .fmus import build, doctor, info
 from .listing import list_
@@ -33,6 +34,7 @@ EXAMPLES = """IMU attitude estimators as drop-in FMUs, with the plants and IMU m
   imufmu run pendulum_swing_up --report swing_up.html --animate swing_up.gif
   imufmu replay walk.csv --estimator lee2012 --set c_a=0.2 --output tilt.csv
   imufmu pack pendulum_lee2012 pendulum.ssp     for other tools
+  imufmu check pendulum_lee2012 --require "plumb.tilt.max < 2 deg"
   imufmu validate --junit verdict.xml           do the papers' conclusions hold?
   imufmu benchmark broad                        every filter on a folder of recordings
   imufmu speed                                  what a sample costs, native and in Python
@@ -59,7 +61,7 @@ def _root(version: Annotated[bool, typer.Option("--version", help="Print the ver
 
 
 app.command("list")(list_)
-for verb in (build, doctor, info, run, replay, pack, demo, validate, benchmark, speed, predict):
+for verb in (build, doctor, info, run, replay, pack, demo, check, validate, benchmark, speed, predict):
     app.command()(verb)
 
 
