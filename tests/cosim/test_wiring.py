@@ -80,7 +80,7 @@ def test_an_input_with_a_value_of_the_description_is_not_noted_as_idle(tmp_path:
 
 def test_all_problems_are_told_at_once(tmp_path: Path) -> None:
     connections = ["plant.w -> sensor.force", "plant.f -> sensor.rate", "plant.count -> sensor.armed"]
-    assert len(problems(tmp_path, connections, bindings={"sensor": binding({"rnage": ("Real", 1, None)})})) == 4
+    assert len(problems(tmp_path, connections, bindings={"sensor": binding({"range": ("Real", 99, None)})})) == 4
 
 
 @pytest.mark.parametrize(
@@ -107,11 +107,11 @@ def test_all_problems_are_told_at_once(tmp_path: Path) -> None:
             "plant.w -> sensor.range: sensor.range is parameter; input is needed. Inputs of sensor in rad/s: rate",
         ),
         (
-            "plant.w_deg -> sensor.rate",
-            "plant.w_deg [deg/s] -> sensor.rate [rad/s]: units differ. Outputs of plant in rad/s: w. "
-            'To convert: LinearTransformation with suppressUnitConversion="true"',
+            "plant.f -> sensor.rate",
+            "plant.f [m/s2] -> sensor.rate [rad/s]: m/s2 and rad/s differ in kind. Outputs of plant in rad/s: w. "
+            'To pass the numbers as they are: suppressUnitConversion="true"',
         ),
-        ("plant.count -> sensor.rate", "plant.count -> sensor.rate [rad/s]: types differ: Integer and Real"),
+        ("plant.w -> sensor.mode", "plant.w [rad/s] -> sensor.mode: types differ: Real and Integer"),
         ("plant.on -> sensor.mode", "plant.on -> sensor.mode: types differ: Boolean and Integer"),
         ("plant.title -> sensor.name", "plant.title -> sensor.name: String variables cannot be connected"),
         (
@@ -136,7 +136,7 @@ def test_a_missing_component_is_told(tmp_path: Path) -> None:
 
 def test_two_sources_of_one_input_are_told(tmp_path: Path) -> None:
     assert problems(tmp_path, ["plant.w -> sensor.rate", "sensor.gyro -> sensor.rate"]) == [
-        "sensor.gyro [rad/s] -> sensor.rate [rad/s]: the input is fed by plant.w [rad/s] already; keep one of the two"
+        "sensor.gyro [rad/s] -> sensor.rate [rad/s]: it is fed by plant.w [rad/s] already; keep one of the two"
     ]
 
 
@@ -151,6 +151,11 @@ def test_a_unit_that_one_end_does_not_name_is_a_note(tmp_path: Path) -> None:
     assert "plant.bare -> sensor.rate [rad/s]: one end does not name its unit; taken for the same" in notes
 
 
+def test_whole_numbers_feed_a_real_input(tmp_path: Path) -> None:
+    link = read(tmp_path, ["plant.count -> sensor.anything |<ssc:LinearTransformation factor='2'/>"]).links[0]
+    assert (link.source[1].type, link.target[1].type, link.factor) == ("Integer", "Real", 2.0)
+
+
 @pytest.mark.parametrize(
     ("name", "xml", "message"),
     [
@@ -161,43 +166,48 @@ def test_a_unit_that_one_end_does_not_name_is_a_note(tmp_path: Path) -> None:
             '<ssd:Connector name="rate" kind="input"><ssc:Integer/></ssd:Connector>',
             "declared as Integer; the FMU says Real",
         ),
-        (
-            "sensor.rate",
-            '<ssd:Connector name="rate" kind="input"><ssc:Real unit="deg/s"/></ssd:Connector>',
-            "declared in deg/s; the FMU says rad/s",
-        ),
     ],
 )
-def test_a_connector_that_contradicts_its_fmu_is_told(tmp_path: Path, name: str, xml: str, message: str) -> None:
-    with pytest.raises(WiringError) as caught:
-        read(tmp_path, connectors={name: xml})
+def test_a_connector_that_contradicts_its_fmu_is_a_note_and_an_error_where_that_is_asked_for(
+    tmp_path: Path, name: str, xml: str, message: str
+) -> None:
+    system = read(tmp_path, ["plant.w -> sensor.rate"], connectors={name: xml})
+    assert any(f"connector {name}: {message}" in note for note in system.notes)
+    assert len(system.links) == 1
+    with pytest.raises(WiringError, match="breaks a standard, and was to be read strictly") as caught:
+        System.read(system.path, strict=True)
     assert f"connector {name}: {message}" in caught.value.problems[0]
 
 
-def test_a_connection_needs_declared_connectors_as_other_tools_do(tmp_path: Path) -> None:
+def test_a_connection_without_declared_connectors_runs_and_is_noted(tmp_path: Path) -> None:
     read(tmp_path, ["plant.w -> sensor.rate"])
     path = tmp_path / "system.ssd"
     path.write_text(
         path.read_text().replace('<ssd:Connectors><ssd:Connector name="w" kind="output"/></ssd:Connectors>', "")
     )
-    with pytest.raises(WiringError, match=r"plant\.w is not among the component's connectors; add it there"):
-        System.read(path)
+    system = System.read(path)
+    assert [str(link) for link in system.links] == ["plant.w [rad/s] -> sensor.rate [rad/s]"]
+    assert any("plant.w is not among the component's connectors; add it there" in note for note in system.notes)
+    with pytest.raises(WiringError, match=r"plant\.w is not among the component's connectors"):
+        System.read(path, strict=True)
 
 
-def test_a_connection_to_the_boundary_is_a_note(tmp_path: Path) -> None:
+def test_an_input_that_the_whole_system_offers_keeps_its_start_value_with_a_note(tmp_path: Path) -> None:
     read(tmp_path, ["plant.w -> sensor.rate"])
     path = tmp_path / "system.ssd"
     path.write_text(path.read_text().replace('startElement="plant"', ""))
-    assert any("w -> sensor.rate: ends at the boundary of the system" in note for note in System.read(path).notes)
+    notes = System.read(path).notes
+    assert "nothing gives w a value: sensor.rate keeps its start value" in notes
+    assert any("w is not among the connectors of its system" in note for note in notes)
 
 
 @pytest.mark.parametrize(
     ("name", "value", "message"),
     [
-        ("rnage", ("Real", 5, None), "sensor.rnage = 5: no parameter of its FMU. Near: range"),
         ("gyro", ("Real", 5, None), "sensor.gyro = 5: no parameter of its FMU. Near: "),
         ("range", ("Real", 10, None), "sensor.range = 10: outside [1, 9] rad/s"),
-        ("range", ("Real", 5, "deg/s"), "sensor.range = 5 deg/s: the FMU wants rad/s"),
+        ("range", ("Real", 5, "m/s2"), "sensor.range = 5 m/s2: the FMU wants rad/s: m/s2 and rad/s differ in kind"),
+        ("range", ("Real", 5, "furlong/x"), "sensor.range = 5 furlong/x: the FMU wants rad/s: nothing says what"),
         ("range", ("Real", "NaN", None), "sensor.range = NaN: expected a value of type Real"),
         ("range", ("Real", "INF", None), "sensor.range = INF: expected a value of type Real"),
         ("range", ("Boolean", "true", None), "sensor.range = true: expected a value of type Real"),
@@ -214,6 +224,14 @@ def test_a_value_that_does_not_fit_is_told(
     found = problems(tmp_path, bindings={"sensor": binding({name: value})})
     assert len(found) == 1
     assert found[0].startswith(message)
+
+
+def test_a_value_for_nothing_is_left_out_as_ssp_has_it_and_noted(tmp_path: Path) -> None:
+    system = read(tmp_path, bindings={"sensor": binding({"rnage": ("Real", 5, None)})})
+    assert system.settings == ()
+    assert any("nothing has the name: sensor.rnage. no parameter of its FMU. Near: range" in n for n in system.notes)
+    with pytest.raises(WiringError, match="rnage"):
+        System.read(system.path, strict=True)
 
 
 def values(system: System) -> dict[str, Any]:
@@ -260,7 +278,7 @@ def test_arguments_may_name_elements_or_whole_vectors(tmp_path: Path) -> None:
     with pytest.raises(WiringError) as caught:
         system.settings_with({"sensor.v": [1, 2, 3], "sensr.v": 1, "sensor.w": 1, "sensor.level": 9})
     assert caught.value.problems == (
-        "parameters: sensor.v: 3 values for 2 elements",
+        "parameters: sensor.v = 1, 2, 3: 3 values for 2 elements",
         "parameters: sensr.v = 1: there is no component 'sensr'; there is plant, sensor",
         "parameters: sensor.w = 1: no parameter of its FMU. Near: anything, armed, file, force",
         "parameters: sensor.level = 9: outside [1, 3]",
@@ -273,7 +291,7 @@ def test_bounds_and_units_of_a_declared_type_count(tmp_path: Path) -> None:
         + '<TypeDefinitions><SimpleType name="Rate"><Real unit="rad/s" min="0" max="2"/></SimpleType></TypeDefinitions>'
     )
     fmu = fake_fmu(tmp_path / "a.fmu", [variable("r", "parameter", declaredType="Rate")], types=types)
-    for value, message in (((3, "rad/s"), r"outside \[0, 2\] rad/s"), ((1, "deg/s"), "the FMU wants rad/s")):
+    for value, message in (((3, "rad/s"), r"outside \[0, 2\] rad/s"), ((1, "m"), "the FMU wants rad/s")):
         bound = binding({"r": ("Real", *value)})
         with pytest.raises(WiringError, match=message):
             System.read(write_ssd(tmp_path / "b.ssd", {"a": fmu}, bindings={"a": bound}))

@@ -124,6 +124,24 @@ class Faulty(Stub):
             signal.raise_signal(signal.SIGINT)
         return True
 """,
+    # An estimator that reports what it is given.
+    "echo": """
+class Echo(Stub):
+    def __init__(self, **kwargs):
+        super().__init__(**kwargs)
+        for i in (1, 2, 3):
+            self.add(Real, f"gyro[{i}]", IN)
+            self.add(Real, f"accel[{i}]", IN)
+        for i in (1, 2, 3):
+            self.add(Real, f"seen[{i}]", OUT, DISCRETE)
+            self.add(Real, f"felt[{i}]", OUT, DISCRETE)
+
+    def do_step(self, t, h):
+        for i in (1, 2, 3):
+            setattr(self, f"seen[{i}]", getattr(self, f"gyro[{i}]"))
+            setattr(self, f"felt[{i}]", getattr(self, f"accel[{i}]"))
+        return True
+""",
     "stillborn": """
 class Stillborn(Stub):
     def __init__(self, **kwargs):
@@ -163,6 +181,16 @@ def _build_as(path: Path, script: Path, body: str) -> None:
     finally:
         sys.modules.pop(script.stem, None)
         sys.path[:] = before
+
+
+def edited_fmu(path: Path, fmu: Path, edit: Callable[[str], str]) -> Path:
+    """A copy of an FMU with another model description."""
+    with zipfile.ZipFile(fmu) as archive:
+        members: dict[str, bytes | str] = {name: archive.read(name) for name in archive.namelist()}
+    text = members["modelDescription.xml"]
+    assert isinstance(text, bytes)
+    members["modelDescription.xml"] = edit(text.decode())
+    return write_zip(path, members)
 
 
 def write_zip(path: Path, members: Mapping[str, bytes | str]) -> Path:

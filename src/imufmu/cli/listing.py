@@ -39,13 +39,14 @@ def _blocks() -> list[Entry]:
 
 
 def _files() -> list[Entry]:
-    from ..cosim.description import read_description, read_xml
+    from ..cosim.description import read_description
+    from ..cosim.ssp.files import read_xml
     from ..files.locations import models_folder
 
     entries = []
     for path in sorted(models_folder().rglob("*.ssd")):
         entries.append(Entry("system", path.stem, read_description(path).description, str(path)))
     for path in sorted((models_folder() / "imus").glob("*.ssv")):
-        parameters = read_xml(path, "SystemStructureParameterValues")
+        parameters = read_xml(path, "ParameterSet")
         entries.append(Entry("device", path.stem, parameters.get("description", parameters.get("name")), str(path)))
     return entries

@@ -14,7 +14,7 @@ from .saving import kept, save
 
 Sets = Annotated[
     list[str] | None,
-    typer.Option("--set", metavar="NAME=VALUE", help="Parameter value; a vector as 1,2,3. Repeatable."),
+    typer.Option("--set", metavar="NAME=VALUE", help="Parameter value: 0.2, 1,2,3 or '500 mm'. Repeatable."),
 ]
 Output = Annotated[Path | None, typer.Option("--output", "-o", help="Write the results to this .csv or .h5 file.")]
 Native = Annotated[bool, typer.Option("--native", help="Our blocks as compiled C instead of Python.")]
@@ -25,6 +25,9 @@ InProcess = Annotated[
 StepTimeout = Annotated[
     float,
     typer.Option("--step-timeout", min=0.001, help="Seconds that an FMU of others may take to answer a call."),
+]
+Strict = Annotated[
+    bool, typer.Option("--strict", help="Refuse descriptions and FMUs that break a standard, however clear they are.")
 ]
 Plot = Annotated[bool, typer.Option("--plot", help="Write a figure next to the working folder's other files.")]
 
@@ -38,6 +41,7 @@ def run(
         bool, typer.Option("--jacobi", help="Take all inputs before the step, as simple masters do.")
     ] = False,
     native: Native = False,
+    strict: Strict = False,
     in_process: InProcess = False,
     step_timeout: StepTimeout = STEP_TIMEOUT,
     output: Output = None,
@@ -56,6 +60,7 @@ def run(
       imufmu run pendulum_lee2012 --set lee2012.mode=3 --set imu.seed=7 --plot
       imufmu run pendulum_swing_up --report swing_up.html --animate swing_up.gif
       imufmu run my_system.ssd --stop 60 --step 0.005 --output run.csv
+      imufmu run pendulum_lee2012 --set "imu.gyro_noise_density=0.005 deg/s/sqrt(Hz)"
       imufmu run pendulum_lee2012 --json
 
     The heading counts from East: an estimator without a magnetometer keeps what it does not know at the start.
@@ -73,7 +78,7 @@ def run(
     check_target(report, ".html")
     check_target(animation, ".gif", ".mp4")
     with progress_bar(f"preparing {system}"):  # builds our FMUs, which can take minutes with --native
-        read = System.read(system, native=native)
+        read = System.read(system, native=native, strict=strict)
     check_pictures(read, plot, report, animation)
     with kept(output), progress_bar(f"running {read.description.name}") as progress:
         result = simulate(

@@ -30,7 +30,7 @@ class Instances:
             raise ValueError(f"step_timeout = {limit:g} s; it must be positive")
         self._stack, self._in_process, self._limit, self._check = stack, in_process, limit, check
         self._scratch = stack.enter_context(scratch_folder("run"))
-        self._unpacked: dict[Path, Unpacked] = {}
+        self._unpacked: dict[tuple[Path, bool], Unpacked] = {}  # each for model exchange or not
         self._guests = 0
         stack.callback(forget_paths, self._scratch)
 
@@ -49,14 +49,15 @@ class Instances:
         return instance
 
     def _unpack(self, fmu: Path, model: Any) -> Unpacked:
-        if fmu not in self._unpacked:
+        key = fmu, model.coSimulation is None
+        if key not in self._unpacked:
             folder = self._scratch / str(len(self._unpacked))
             folder.mkdir()
-            library, _ = open_fmu(fmu, folder)
+            library, _ = open_fmu(fmu, folder, model)
             identifier, version = interface_of(model).modelIdentifier, model.fmiMajorVersion
             equations = None if model.coSimulation else _equations(model)
-            self._unpacked[fmu] = Unpacked(library, folder, model.guid, identifier, version, equations)
-        return self._unpacked[fmu]
+            self._unpacked[key] = Unpacked(library, folder, model.guid, identifier, version, equations)
+        return self._unpacked[key]
 
 
 def _equations(model: Any) -> Equations:

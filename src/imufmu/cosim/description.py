@@ -1,9 +1,12 @@
-"""Read a system description: SSP 1.0 (System Structure and Parameterization), one flat system of FMUs.
+"""Read a system description: SSP 1.0 or 2.0 (System Structure and Parameterization), nested systems laid out flat.
 
-The schemas come from fmpy. Its object model drops what the checks need (types and units of connectors, inline
-mappings, transformations, the default experiment), so the elements are read here.
+A component or system inside systems has the names of all of them, "chassis.wheel.brake", as the hierarchical names of
+SSP have it. The elements are read here, and not by a library: fmpy.ssp drops types and units of connectors, inline
+mappings, transformations and the default experiment; pyssp-standard 0.9 drops transformations of connections,
+suppressUnitConversion, signal dictionaries and the lines that messages name, and stops at an experiment without times.
 
-The communication step size, for which SSP 1.0 has no place, is an annotation of the default experiment:
+The communication step size, for which SSP has no place, is an annotation of the default experiment; those of
+OMSimulator and of the Open Simulation Platform are understood, too:
 
     <ssd:DefaultExperiment startTime="0" stopTime="20">
       <ssd:Annotations>
@@ -16,94 +19,108 @@ The communication step size, for which SSP 1.0 has no place, is an annotation of
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from functools import lru_cache
-from importlib.util import find_spec
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
-from urllib.parse import unquote, urlparse
 
 from lxml import etree
 
-from ..files.archives import LARGEST_READ, listed, parse_xml
+from .ssp.connectors import Connector, connectors_of
+from .ssp.files import (
+    NAMESPACES,
+    DescriptionError,
+    Sources,
+    number,
+    read_bytes,
+    read_root,
+    required,
+    units_in,
+)
+from .ssp.parameters import ParameterValue, bound_values
+from .ssp.signals import Dictionaries
+from .ssp.transformations import Transformation, transformation_of
+from .units import Unit
 
-SSP = "http://ssp-standard.org/SSP1/"
-NAMESPACES = {
-    "ssd": f"{SSP}SystemStructureDescription",
-    "ssc": f"{SSP}SystemStructureCommon",
-    "ssv": f"{SSP}SystemStructureParameterValues",
-    "imufmu": "urn:imufmu:ssp",
-}
 FMU_TYPE = "application/x-fmu-sharedlibrary"
-PARAMETER_SET_TYPE = "application/x-ssp-parameter-set"
-ANNOTATION_TYPE = "org.imufmu"
+_ROOT = "SystemStructureDescription"
+_DEEPEST = 50  # systems in systems: more is a circle of references
+# Attributes that hold a step size (s), each with the type of the annotation that it is in.
+_STEPS = (
+    ("org.imufmu", "Communication", "stepSize"),
+    ("com.opensimulationplatform", "FixedStepAlgorithm", "baseStepSize"),
+    ("org.openmodelica", "FixedStepMaster", "stepSize"),
+)
 
-
-class DescriptionError(ValueError):
-    """A system description cannot be used; the message names the file, the line and the reason."""
-
-
-@dataclass(frozen=True)
-class Connector:
-    """A declared connector of a component; type and unit are None where the description leaves them open."""
-
-    kind: str
-    type: str | None
-    unit: str | None
-    line: int
-
-
-@dataclass(frozen=True)
-class ParameterValue:
-    """One value of a parameter set: text as written, its SSP type, and where it stands."""
-
-    name: str
-    type: str
-    value: str
-    unit: str | None
-    where: str
+__all__ = ["NAMESPACES", "Component", "Connection", "Connector", "Description", "DescriptionError", "End"]
 
 
 @dataclass(frozen=True)
 class Component:
-    """One FMU of the system; values in order of increasing precedence."""
+    """One FMU of the system. name: with those of the systems around it.
+
+    implementation: ModelExchange or CoSimulation where the description wants one of these; else any.
+    """
 
     name: str
     description: str
     source: Path
     connectors: dict[str, Connector]
-    values: tuple[ParameterValue, ...]
-    line: int
+    where: str
+    implementation: str = "any"
+
+
+@dataclass(frozen=True)
+class End:
+    """One end of a connection. element: a component, a system ("" is the whole) or a signal dictionary.
+
+    role: whether values come out of this end ("source") or go into it ("sink"), as seen from the connection; "either"
+    where the other end tells; "component" where its FMU tells.
+    """
+
+    element: str
+    connector: str
+    role: str
+
+    def __str__(self) -> str:
+        return f"{self.element}.{self.connector}" if self.element else self.connector
 
 
 @dataclass(frozen=True)
 class Connection:
-    """Two ends (component, connector) whose kinds say which is the source; "" is the boundary of the system.
+    """A connection as written: its two ends, which do not say in which direction values go.
 
-    target = factor * source + offset.
+    same_units: False where the author takes care of units (suppressUnitConversion).
     """
 
-    start: tuple[str, str]
-    end: tuple[str, str]
-    factor: float
-    offset: float
-    same_units: bool  # False: the author takes care of units (suppressUnitConversion)
-    line: int
+    start: End
+    end: End
+    transformation: Transformation
+    same_units: bool
+    where: str
+
+    def __str__(self) -> str:
+        return f"{self.where}: {self.start} -> {self.end}"
 
 
 @dataclass(frozen=True)
 class Description:
-    """A system as written: paths absolute, nothing checked against the FMUs."""
+    """A system as written: paths absolute, nothing checked against the FMUs.
+
+    systems: connectors of the systems and signal dictionaries by their names, "" for the whole. values: by their names
+    in the whole system, in order of increasing precedence. faults: what is formally wrong, but clear.
+    """
 
     path: Path
     name: str
     description: str
     components: tuple[Component, ...]
+    systems: dict[str, dict[str, Connector]]
     connections: tuple[Connection, ...]
-    values: tuple[ParameterValue, ...]  # of the whole system, named component.parameter
+    values: tuple[ParameterValue, ...]
     start_time: float | None
     stop_time: float | None
     step: float | None
+    faults: tuple[str, ...] = ()
 
 
 def read_description(path: Path, inside: Path | None = None) -> Description:
@@ -111,166 +128,166 @@ def read_description(path: Path, inside: Path | None = None) -> Description:
 
     Raises DescriptionError, and ArchiveError for XML that is unsafe or not well-formed.
     """
-    files = Sources(path, inside)
-    root = read_xml(path, "SystemStructureDescription")
-    system = root.find("ssd:System", NAMESPACES)
+    faults: list[str] = []
+    root = read_root(read_bytes(path), path, _ROOT, faults)
+    flat = _Flat(inside, faults)
+    flat.add(_system_of(root, path), "", Sources(path, inside, faults), units_in(root), Dictionaries())
     experiment = root.find("ssd:DefaultExperiment", NAMESPACES)
-    for unsupported in ("System", "SignalDictionaryReference"):
-        for element in system.iterfind(f"ssd:Elements/ssd:{unsupported}", NAMESPACES):
-            raise DescriptionError(
-                f"{path}, line {element.sourceline}: {unsupported} {element.get('name')!r} inside a system is not "
-                "supported; describe one flat system of FMUs"
-            )
-    step = None
-    for communication in root.iterfind(
-        f"ssd:DefaultExperiment/ssd:Annotations/ssc:Annotation[@type='{ANNOTATION_TYPE}']/imufmu:Communication",
-        NAMESPACES,
-    ):
-        step = _number(communication, "stepSize", path)
+    start, stop = (
+        None if experiment is None else number(experiment, attribute, path) for attribute in ("startTime", "stopTime")
+    )
+    values = sorted(flat.values, key=lambda leveled: -leveled[0])  # values of a system go before those inside it
     return Description(
         path,
-        name=root.get("name"),
-        description=system.get("description") or root.get("description") or "",
-        components=tuple(_component(c, files) for c in system.iterfind("ssd:Elements/ssd:Component", NAMESPACES)),
-        connections=tuple(_connection(c, path) for c in system.iterfind("ssd:Connections/ssd:Connection", NAMESPACES)),
-        values=_bound_values(system, files),
-        start_time=None if experiment is None else _number(experiment, "startTime", path),
-        stop_time=None if experiment is None else _number(experiment, "stopTime", path),
-        step=step,
+        name=root.get("name") or path.stem,
+        description=_system_of(root, path).get("description") or root.get("description") or "",
+        components=tuple(flat.components),
+        systems=flat.systems,
+        connections=tuple(flat.connections),
+        values=tuple(value for _, value in values),
+        start_time=start,
+        stop_time=stop,
+        step=_step(root, path),
+        faults=tuple(faults),
     )
 
 
-@dataclass(frozen=True)
-class Sources:
-    """Files that a description refers to, relative to itself."""
-
-    ssd: Path
-    inside: Path | None  # the folder they must not leave
-
-    def __call__(self, element: Any) -> Path:
-        """Path that the ``source`` attribute of an element means. Raises DescriptionError."""
-        source = element.get("source")
-        address = urlparse(source)
-        path = (self.ssd.parent / unquote(address.path)).resolve()
-        where = f"{self.ssd}, line {element.sourceline}: source {source!r}"
-        if address.scheme or address.netloc or address.fragment or not address.path:
-            raise DescriptionError(f"{where}: expected a path relative to the description")
-        if self.inside and not path.is_relative_to(self.inside):
-            raise DescriptionError(f"{where}: leaves the archive")
-        return path
+def _system_of(root: Any, path: Path) -> Any:
+    system = root.find("ssd:System", NAMESPACES)
+    if system is None:
+        raise DescriptionError(f"{path}: there is no System in it")
+    return system
 
 
-def read_xml(path: Path, schema: str) -> Any:
-    """Root element of an SSP file that follows the schema. Raises DescriptionError and ArchiveError."""
-    try:
-        with path.open("rb") as file:
-            content = file.read(LARGEST_READ + 1)
-    except OSError as error:
-        raise DescriptionError(f"{path}: cannot be read: {error.strerror or error}") from error
-    root = parse_xml(content, str(path))
-    _validate(root, schema, path)
-    return root
+def _step(root: Any, path: Path) -> float | None:
+    """The step size of an annotation, ours first."""
+    for kind, name, attribute in _STEPS:
+        for found in root.iterfind(f".//ssc:Annotation[@type='{kind}']//{{*}}{name}", NAMESPACES):
+            return number(found, attribute, path)
+    return None
 
 
-def _validate(root: Any, schema: str, path: Path) -> None:
-    rules = _schema(schema)
-    if not rules.validate(root):
-        problems = [f"line {entry.line}: {entry.message}" for entry in rules.error_log]
-        raise DescriptionError(f"{path}: not a valid {schema}: {listed(problems)}")
+@dataclass
+class _Flat:
+    """Collects what is in nested systems, each thing under its full name."""
 
+    inside: Path | None
+    faults: list[str]
+    components: list[Component] = field(default_factory=list)
+    systems: dict[str, dict[str, Connector]] = field(default_factory=dict)
+    connections: list[Connection] = field(default_factory=list)
+    values: list[tuple[int, ParameterValue]] = field(default_factory=list)  # each with the depth of its binding
 
-@lru_cache
-def _schema(name: str) -> Any:
-    found = find_spec("fmpy")  # to import it takes longer than to read a description
-    assert found and found.origin
-    return etree.XMLSchema(file=str(Path(found.origin).parent / "ssp" / "schema" / f"{name}.xsd"))
+    def add(
+        self, system: Any, name: str, files: Sources, units: dict[str, Unit], dictionaries: Dictionaries, depth: int = 0
+    ) -> None:
+        """A system and all that is in it; name: "" for the whole."""
+        if depth > _DEEPEST:
+            raise DescriptionError(f"{files.where(system)}: systems inside systems without an end")
+        self.systems[name] = dict(connectors_of(system, files, units))
+        self._bind(system, name, files, None, depth)
+        dictionaries = dictionaries.within(system, name, files)
+        self.systems |= dictionaries.new
+        inner: dict[str, tuple[str, dict[str, Connector]]] = {}  # kind of element and its connectors, by its own name
+        for element in system.iterfind("ssd:Elements/*", NAMESPACES):
+            own = required(element, "name", files.ssd)
+            full = _joined(name, own)
+            kind = etree.QName(element).localname
+            if own in inner:
+                raise DescriptionError(f"{files.where(element)}: {own!r}: the name occurs twice; rename one of them")
+            if kind == "System":
+                self.add(element, full, files, units, dictionaries, depth + 1)
+            elif kind == "Component":
+                kind = self._component(element, full, files, units, dictionaries, depth + 1)
+            elif kind != "SignalDictionaryReference":
+                self.faults.append(f"{files.where(element)}: {kind} is no element of a system; left out")
+                continue
+            declared = dict(connectors_of(element, files, units))
+            inner[own] = kind, self.systems[full] | declared if kind == "System" else declared
+            if kind == "SignalDictionaryReference":
+                dictionaries.refer(own, required(element, "dictionary", files.ssd), files.where(element))
+        for element in system.iterfind("ssd:Connections/ssd:Connection", NAMESPACES):
+            start, end = (
+                _end(element.get(f"{side}Element", ""), required(element, f"{side}Connector", files.ssd), name,
+                     self.systems[name], inner, dictionaries)
+                for side in ("start", "end")
+            )  # fmt: skip
+            same_units = element.get("suppressUnitConversion") not in ("true", "1")
+            self.connections.append(
+                Connection(start, end, transformation_of(element, files), same_units, files.where(element))
+            )
 
+    def _bind(self, element: Any, name: str, files: Sources, component: Path | None, depth: int) -> None:
+        for value in bound_values(element, files, component):
+            self.values.append((depth, replace(value, name=_joined(name, value.name))))
 
-def _component(element: Any, files: Sources) -> Component:
-    path, name, line = files.ssd, element.get("name"), element.sourceline
-    if element.get("type", FMU_TYPE) != FMU_TYPE:
-        raise DescriptionError(f"{path}, line {line}: component {name!r} is no FMU; only FMUs are supported")
-    if element.get("implementation") == "ModelExchange":
-        raise DescriptionError(f"{path}, line {line}: component {name!r}: only co-simulation is supported")
-    return Component(
-        name,
-        element.get("description", ""),
-        files(element),
-        {c.get("name"): _connector(c) for c in element.iterfind("ssd:Connectors/ssd:Connector", NAMESPACES)},
-        _bound_values(element, files),
-        line,
-    )
-
-
-def _connector(element: Any) -> Connector:
-    declared = _first_child(element, "ssc")
-    return Connector(
-        element.get("kind"),
-        None if declared is None else etree.QName(declared).localname,
-        None if declared is None else declared.get("unit"),
-        element.sourceline,
-    )
-
-
-def _connection(element: Any, path: Path) -> Connection:
-    linear = _first_child(element, "ssc")
-    if linear is not None and etree.QName(linear).localname != "LinearTransformation":
-        raise DescriptionError(f"{path}, line {linear.sourceline}: only a LinearTransformation is supported")
-    factor = offset = None
-    if linear is not None:
-        factor, offset = _number(linear, "factor", path), _number(linear, "offset", path)
-    return Connection(
-        (element.get("startElement", ""), element.get("startConnector")),
-        (element.get("endElement", ""), element.get("endConnector")),
-        1.0 if factor is None else factor,
-        0.0 if offset is None else offset,
-        element.get("suppressUnitConversion") not in ("true", "1"),
-        element.sourceline,
-    )
-
-
-def _bound_values(element: Any, files: Sources) -> tuple[ParameterValue, ...]:
-    """Values bound to a component or system, prefix included, later ones taking precedence."""
-    path = files.ssd
-    values: list[ParameterValue] = []
-    for binding in element.iterfind("ssd:ParameterBindings/ssd:ParameterBinding", NAMESPACES):
-        where = f"{path}, line {binding.sourceline}"
-        if binding.get("type", PARAMETER_SET_TYPE) != PARAMETER_SET_TYPE or binding.get("sourceBase") == "component":
-            raise DescriptionError(f"{where}: only parameter sets (.ssv) beside the description are supported")
-        if binding.find("ssd:ParameterMapping", NAMESPACES) is not None:
-            raise DescriptionError(f"{where}: a ParameterMapping is not supported; use the names of the FMU")
-        prefix = binding.get("prefix", "")
-        if binding.get("source") is not None:
-            file = files(binding)
-            values += _parameter_set(read_xml(file, "SystemStructureParameterValues"), file, prefix)
-        for inline in binding.iterfind("ssd:ParameterValues/ssv:ParameterSet", NAMESPACES):
-            _validate(inline, "SystemStructureParameterValues", path)
-            values += _parameter_set(inline, path, prefix)
-    return tuple(values)
-
-
-def _parameter_set(element: Any, path: Path, prefix: str) -> list[ParameterValue]:
-    values = []
-    for parameter in element.iterfind("ssv:Parameters/ssv:Parameter", NAMESPACES):
-        value = _first_child(parameter, "ssv")
-        where = f"{path}, line {parameter.sourceline}"
-        kind = etree.QName(value).localname
-        values.append(
-            ParameterValue(prefix + parameter.get("name"), kind, value.get("value"), value.get("unit"), where)
+    def _component(
+        self, element: Any, name: str, files: Sources, units: dict[str, Unit], dictionaries: Dictionaries, depth: int
+    ) -> str:
+        """Add a component; says whether it is one, or another description and so a System."""
+        where, kind = f"{files.where(element)}: component {name!r}", element.get("type", FMU_TYPE)
+        if element.get("source") is None:
+            raise DescriptionError(f"{where} has no source: there is nothing to run; give its FMU")
+        if element.get("source").startswith("#"):
+            systems = element.getroottree().iterfind(".//ssd:System", NAMESPACES)
+            meant = next((s for s in systems if s.get("id") == element.get("source")[1:]), None)
+            if meant is None:
+                raise DescriptionError(f"{where}: no system here has the id {element.get('source')[1:]!r}")
+            self.add(meant, name, files, units, dictionaries, depth)
+            self._bind(element, name, files, None, depth)
+            return "System"
+        if kind == "application/x-ssp-definition" or element.get("source").lower().endswith(".ssd"):
+            path = files.path(element)
+            root = read_root(read_bytes(path), path, _ROOT, self.faults)
+            inner = Sources(path, self.inside, self.faults)
+            self.add(_system_of(root, path), name, inner, units_in(root), Dictionaries(), depth)
+            self._bind(element, name, files, path, depth)
+            return "System"
+        if kind != FMU_TYPE:
+            raise DescriptionError(f"{where} is no FMU, but {kind}; only FMUs and .ssd files are supported")
+        source = files.path(element)
+        connectors = dict(connectors_of(element, files, units))
+        self.components.append(
+            Component(
+                name,
+                element.get("description", ""),
+                source,
+                connectors,
+                files.where(element),
+                element.get("implementation", "any"),
+            )
         )
-    return values
+        self._bind(element, name, files, source, depth)
+        return "Component"
 
 
-def _first_child(element: Any, namespace: str) -> Any:
-    return next(element.iterchildren(f"{{{NAMESPACES[namespace]}}}*"), None)
+def _joined(system: str, name: str) -> str:
+    return f"{system}.{name}" if system else name
 
 
-def _number(element: Any, attribute: str, path: Path) -> float | None:
-    text = element.get(attribute)
-    if text is None:
-        return None
-    try:
-        return float(text)
-    except ValueError:
-        where = f"{path}, line {element.sourceline}"
-        raise DescriptionError(f"{where}: {attribute}={text!r} is not a number") from None
+# Kinds of connectors through which values go into an element, and out of one.
+_INTO = ("input", "parameter")
+_OUT_OF = ("output", "calculatedParameter")
+
+
+def _end(
+    element: str,
+    connector: str,
+    system: str,
+    connectors: dict[str, Connector],
+    inner: dict[str, tuple[str, dict[str, Connector]]],
+    dictionaries: Dictionaries,
+) -> End:
+    """An end by its full name. element: its own name, "" for the system around the connection."""
+    if not element:  # seen from inside: what goes into the system comes out of its connector
+        kind = connectors[connector].kind if connector in connectors else None
+        role = "source" if kind in _INTO else "sink" if kind in _OUT_OF else "either"
+        return End(system, connector, role)
+    what, its = inner.get(element, ("Component", {}))
+    if what == "Component":
+        return End(_joined(system, element), connector, "component")
+    kind = its[connector].kind if connector in its else None
+    role = "sink" if kind in _INTO else "source" if kind in _OUT_OF else "either"
+    if what == "SignalDictionaryReference":
+        return End(dictionaries.of(element), connector, role)
+    return End(_joined(system, element), connector, role)

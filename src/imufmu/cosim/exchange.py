@@ -67,12 +67,16 @@ class Exchange:
     def inlets(self, component: str) -> list[Inlet]:
         """What a component's inputs are set from."""
         inlets = []
-        for kind, pool in self.values.items():
-            links = [k for k in self._links if k.target[0] == component and representation(k.target[1]) == kind]
-            if links:
-                sources = np.array([self._source(link) for link in links])
-                factor, offset = (np.array([getattr(k, part) for k in links]) for part in ("factor", "offset"))
-                inlets.append(Inlet(kind, [k.target[1] for k in links], pool, sources, factor, offset))
+        to_it = [link for link in self._links if link.target[0] == component]
+        for kind in self.values:
+            for before, pool in self.values.items():  # whole numbers may feed real ones
+                kinds = before, kind
+                links = [k for k in to_it if (representation(k.source[1]), representation(k.target[1])) == kinds]
+                if links:
+                    sources = np.array([self._source(link) for link in links])
+                    factor, offset = (np.array([getattr(k, part) for k in links]) for part in ("factor", "offset"))
+                    tables = {i: link.table for i, link in enumerate(links) if link.table}
+                    inlets.append(Inlet(kind, [k.target[1] for k in links], pool, sources, factor, offset, tables))
         return inlets
 
     def _source(self, link: Link) -> int:

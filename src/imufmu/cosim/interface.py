@@ -3,11 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections import Counter
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
 from difflib import SequenceMatcher
+from functools import cached_property
 from pathlib import Path
 from typing import Any
+
+from attrs import asdict
+
+from .units import Unit, defined
 
 _SUGGESTIONS = 4
 
@@ -22,14 +28,55 @@ class WiringError(ValueError):
 
 @dataclass(frozen=True)
 class Interface:
-    """Variables (fmpy ModelVariable) of one component by name, in the order of its FMU."""
+    """Variables (fmpy ModelVariable) of one component by name, in the order of its FMU, and the units it defines."""
 
     component: str
     variables: dict[str, Any]
+    units: Mapping[str, Unit] = field(default_factory=dict)
+    unclear: frozenset[str] = frozenset()  # names that several variables have
+
+    @staticmethod
+    def of_model(component: str, model: Any) -> Interface:
+        """Interface of an FMU with this ModelDescription (fmpy)."""
+        units = {
+            unit.name: defined(unit.name, asdict(unit.baseUnit)) if unit.baseUnit else Unit(unit.name)
+            for unit in model.unitDefinitions
+        }
+        counted = Counter(variable.name for variable in model.modelVariables)
+        unclear = frozenset(name for name, count in counted.items() if count > 1)
+        return Interface(component, {variable.name: variable for variable in model.modelVariables}, units, unclear)
+
+    def unit(self, variable: Any) -> Unit | None:
+        """Unit of a variable with what the FMU says of it; None where the FMU does not say."""
+        name = unit_of(variable)
+        if not name:
+            return None
+        unit = self.units.get(name, Unit(name))
+        relative = any(getattr(of, "relativeQuantity", False) for of in (variable, variable.declaredType))
+        if relative and unit.base and unit.base.offset:
+            return Unit(name, replace(unit.base, offset=0.0))
+        return unit
+
+    def elements(self, name: str) -> list[str]:
+        """Names of the elements of a vector or matrix, in the order of the FMU; empty for any other name."""
+        return self._elements.get(name, [])
+
+    @cached_property
+    def _elements(self) -> dict[str, list[str]]:
+        found: dict[str, list[str]] = {}
+        for variable in self.variables:
+            name, bracket, _ = variable.rpartition("[")
+            if bracket and variable.endswith("]"):
+                found.setdefault(name, []).append(variable)
+        return found
 
     def of(self, *causalities: str) -> list[Any]:
         """Variables of these causalities, in the order of the FMU."""
         return [variable for variable in self.variables.values() if variable.causality in causalities]
+
+    def why_unclear(self, name: str) -> str:
+        """Why a name cannot be used, for messages; empty if it can."""
+        return "several variables of the FMU have this name: which one is meant?" if name in self.unclear else ""
 
     def suggest(self, name: str, causality: str, unit: str | None) -> str:
         """End of a message: variables of this causality and unit (None: any), those most like ``name`` first."""
@@ -45,6 +92,12 @@ def representation(variable: Any) -> str:
 def unit_of(variable: Any) -> str | None:
     """Unit of a variable, its own or its declared type's; None where the FMU does not say."""
     return variable.unit or (variable.declaredType.unit if variable.declaredType else None)
+
+
+def items_of(variable: Any) -> dict[str, int]:
+    """Items of an Enumeration by name; empty for any other variable."""
+    declared = variable.declaredType
+    return {item.name: int(item.value) for item in declared.items} if declared is not None else {}
 
 
 def bounds_of(variable: Any) -> tuple[float, float]:

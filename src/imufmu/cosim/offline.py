@@ -13,6 +13,7 @@ from ..files.names import no_such
 from ..recordings.reading import Recording
 from ..registry import ESTIMATORS
 from .replay import Replay
+from .units import Unit, quantity
 
 
 def replay_offline(recording: Recording, name: str, parameters: Mapping[str, Any] | None = None) -> Replay:
@@ -25,8 +26,9 @@ def replay_offline(recording: Recording, name: str, parameters: Mapping[str, Any
     if name not in blocks:
         raise ValueError(no_such("estimator", name, list(blocks), "an FMU runs forward only"))
     block, readings = blocks[name], recording.at_instants()
+    given = {name: _in_unit(block, name, value) for name, value in (parameters or {}).items()}
     inputs = {signal.name: readings[signal.name] for signal in block.inputs if signal.name in ("gyro", "accel")}
-    found = run_offline(block, inputs, {**(parameters or {}), "sample_period": recording.sample_period})
+    found = run_offline(block, inputs, {**given, "sample_period": recording.sample_period})
     units = {signal.name: signal.unit for signal in block.outputs}
     columns: dict[str, np.ndarray] = {}
     for signal_name, values in found.values.items():
@@ -34,3 +36,14 @@ def replay_offline(recording: Recording, name: str, parameters: Mapping[str, Any
         parts = {signal_name: rows} if rows.ndim == 1 else {f"{signal_name}[{i + 1}]": rows[:, i] for i in range(3)}
         columns |= parts
     return Replay(recording, name, columns, {c: units[c.split("[")[0]] for c in columns}, recording.notes)
+
+
+def _in_unit(block: SampledBlock, name: str, value: Any) -> Any:
+    """A value that may be a text with its unit, such as "0.1 deg/s"."""
+    units = {parameter.name: parameter.unit for parameter in block.parameters}
+    if not isinstance(value, str) or name not in units:
+        return value
+    try:
+        return quantity(value, Unit(units[name]))
+    except ValueError as error:
+        raise ValueError(f"{name} = {value}: {error}") from error

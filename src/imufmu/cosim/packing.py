@@ -14,9 +14,10 @@ from typing import Any
 from lxml import etree
 
 from ..files.atomic import atomic_write, check_not_read
-from .description import NAMESPACES, read_xml
+from .description import FMU_TYPE
 from .interface import representation, unit_of
 from .settings import Setting
+from .ssp.files import NAMESPACES, DescriptionError, Sources, read_bytes, read_root
 from .system import STRUCTURE, System
 
 PARAMETER_SET = "parameters"  # name of the set of each component
@@ -27,22 +28,30 @@ _FIXED_TIME = (1980, 1, 1, 0, 0, 0)  # the earliest a zip can say: equal content
 def pack(ssd: str | Path, target: str | Path, *, native: bool = False) -> Path:
     """Write the system described by ``ssd`` to ``target``, its FMUs under ``resources/``, its parameters inside.
 
-    native: as in System.read. Returns the path written. Raises what System.read raises, and WriteError.
+    native: as in System.read. Returns the path written. Raises what System.read raises, DescriptionError for a system
+    that refers to other descriptions, and WriteError.
     """
     system = System.read(ssd, native=native)
     check_not_read(target, [ssd, *(part.fmu for part in system.parts)])
-    root = read_xml(system.description.path, "SystemStructureDescription")
+    described = system.description.path
+    root = read_root(read_bytes(described), described, "SystemStructureDescription", [])
     members: dict[str, Path] = {}
     for bindings in root.findall(".//ssd:ParameterBindings", NAMESPACES):
         bindings.getparent().remove(bindings)
-    for component in root.iterfind("ssd:System/ssd:Elements/ssd:Component", NAMESPACES):
-        name = component.get("name")
+    for component in root.iterfind(".//ssd:Component", NAMESPACES):
+        name = _full_name(component)
+        if component.get("type", FMU_TYPE) != FMU_TYPE or component.get("source").startswith("#"):
+            raise DescriptionError(f"{ssd}: {name} refers to another system; put that in its place to pack it")
         component.set("source", _member(next(part.fmu for part in system.parts if part.name == name), members))
         settings = [setting for setting in system.settings if setting.component == name]
         if settings:
             # The standard wants it behind these two.
             before = [component.find(f"ssd:{tag}", NAMESPACES) for tag in ("Connectors", "ElementGeometry")]
             component.insert(sum(element is not None for element in before), _bindings(settings))
+    for dictionary in root.iterfind(".//ssd:SignalDictionary[@source]", NAMESPACES):
+        content, path = Sources(described, None).content(dictionary, None)
+        dictionary.append(read_root(content, path, "SignalDictionary", []))
+        del dictionary.attrib["source"]
     etree.indent(root)
     contents = {name: path.read_bytes() for name, path in members.items()}
     contents[STRUCTURE] = etree.tostring(root, xml_declaration=True, encoding="UTF-8")
@@ -53,6 +62,12 @@ def pack(ssd: str | Path, target: str | Path, *, native: bool = False) -> Path:
             entry.external_attr = 0o644 << 16
             archive.writestr(entry, content)
     return Path(target)
+
+
+def _full_name(component: Any) -> str:
+    """Name of a component with those of the systems around it, without that of the whole."""
+    around = [system.get("name") for system in component.iterancestors(f"{{{NAMESPACES['ssd']}}}System")]
+    return ".".join([*reversed(around[:-1]), component.get("name")])
 
 
 def _bindings(settings: Sequence[Setting]) -> Any:

@@ -25,9 +25,11 @@ from .apart import Instance, Instances
 from .errors import STEP_TIMEOUT, SimulationError
 from .interface import Interface, WiringError, unit_of
 from .interrupt import Terminated, interrupt_between_calls
+from .links import Wiring
 from .results import Result, partial_remark
 from .settings import Setting, given_settings
 from .slave import Inlet, Outlet
+from .units import SAME, Unit, UnitError, conversion
 
 _READINGS = {signal.name: signal for signal in (GYRO, ACCEL, MAG, FORWARD_SPEED)}
 _OPTIONAL = (MAG.name, FORWARD_SPEED.name)
@@ -113,9 +115,11 @@ def replay(
     Raises ArchiveError, WiringError (the FMU or a parameter does not fit) and SimulationError. That, and
     KeyboardInterrupt, has the rows up to there as ``result``, where there are any.
     """
-    model = read_fmu(fmu)
-    interface = Interface(model.modelName, {v.name: v for v in model.modelVariables})
+    faults: list[str] = []
+    model = read_fmu(fmu, faults)
+    interface = Interface.of_model(model.modelName, model)
     used, readings, notes = _inputs(interface, recording, fmu)
+    notes += [f"not as the standard has it: {fault}" for fault in faults]
     settings = _settings(interface, recording, dict(parameters or {}), fmu)
     outputs = [v for v in interface.of("output") if v.type == "Real"]
     reported = outputs + [v for v in interface.of("local") if v.type == "Real" and local_variables]
@@ -211,10 +215,13 @@ def _inputs(interface: Interface, recording: Recording, fmu: Path) -> tuple[list
             variable = inputs.get(element)
             if variable is None:
                 continue
-            if unit_of(variable) not in (None, signal.unit):
-                problems.append(f"{element} is in {unit_of(variable)}, the recording in {signal.unit}")
+            try:
+                linear = conversion(Unit(signal.unit), interface.unit(variable))
+            except UnitError as error:
+                problems.append(f"{element}: {error}")
+                continue
             used.append(variable)
-            columns.append(values[:, i])
+            columns.append(values[:, i] if linear == SAME else linear.factor * values[:, i] + linear.offset)
         if wanted and name + _VALID in inputs:
             used.append(inputs[name + _VALID])
             columns.append(np.isfinite(values).all(axis=1).astype(float))
@@ -253,7 +260,7 @@ def _settings(interface: Interface, recording: Recording, parameters: dict[str, 
             "leave it out, it follows the recording"
         )
     full_names = {f"{interface.component}.{name}": value for name, value in parameters.items()}
-    settings = given_settings(full_names, {interface.component: interface}, problems)
+    settings = given_settings(full_names, Wiring.of_one(interface), problems)
     if problems:
         raise WiringError(fmu, problems, f"cannot replay {recording.path}")
     return settings

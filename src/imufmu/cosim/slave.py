@@ -9,9 +9,9 @@ from __future__ import annotations
 import importlib
 import os
 import sys
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from ctypes import POINTER, c_char_p, c_double, c_int, c_uint
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -115,7 +115,10 @@ class Outlet:
 
 @dataclass(frozen=True)
 class Inlet:
-    """Inputs of one kind that are set together: factor * pool[sources] + offset, each (n,)."""
+    """Inputs of one kind that are set together: factor * pool[sources] + offset, each (n,).
+
+    tables: of those whose whole numbers are exchanged for others, by place.
+    """
 
     kind: str
     variables: Sequence[Any]
@@ -123,6 +126,7 @@ class Inlet:
     sources: np.ndarray
     factor: np.ndarray
     offset: np.ndarray
+    tables: Mapping[int, Mapping[int, int]] = field(default_factory=dict)
 
 
 class Inputs:
@@ -135,10 +139,15 @@ class Inputs:
     def gather(self) -> None:
         """Take the inputs from the present values of their sources."""
         for inlet, buffer, as_it_is in self._each:
-            inlet.pool.take(inlet.sources, out=buffer, mode="clip")
+            if inlet.pool.dtype == buffer.dtype:
+                inlet.pool.take(inlet.sources, out=buffer, mode="clip")
+            else:
+                buffer[:] = inlet.pool[inlet.sources]
             if not as_it_is:
                 buffer *= inlet.factor
                 buffer += inlet.offset
+            for i, table in inlet.tables.items():
+                buffer[i] = table.get(int(buffer[i]), buffer[i])
 
 
 class Slave:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import weakref
 from collections.abc import Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -13,15 +14,16 @@ from ..files.archives import ArchiveError, unpack
 from ..files.locations import models_folder
 from ..files.names import no_such
 from ..files.scratch import new_scratch
-from ..fmi.archive import interface_of, read_fmu
+from ..fmi.archive import interface_of, kinds_of, read_fmu
 from ..fmi.build import cached_fmu
 from ..fmi.native import cached_native_fmu
 from ..fmi.own import is_ours
 from ..registry import BLOCKS
 from .description import Component, Description, DescriptionError, read_description
 from .interface import Interface, WiringError
-from .links import Link, find_links
+from .links import Link, Wiring
 from .settings import Setting, bound_settings, given_settings, merged
+from .wiring import find_wiring
 
 STRUCTURE = "SystemStructure.ssd"  # the description inside an .ssp
 
@@ -38,53 +40,64 @@ class Part:
 
 @dataclass(frozen=True, eq=False)
 class System:
-    """A description, its FMUs, and the wiring between them, without faults.
+    """A description, its FMUs, and the wiring between them.
 
-    path: the file it was read from. notes: what is unusual but no error.
+    path: the file it was read from. notes: what is unusual but no error, and what is formally wrong but clear.
     """
 
     path: Path
     description: Description
     parts: tuple[Part, ...]
-    links: tuple[Link, ...]
+    wiring: Wiring
     settings: tuple[Setting, ...]
     notes: tuple[str, ...]
 
     @staticmethod
-    def read(path: str | Path, *, native: bool = False) -> System:
+    def read(path: str | Path, *, native: bool = False, strict: bool = False) -> System:
         """Read an .ssd or .ssp file, or a system of imufmu by its name.
 
         An FMU that is not where the .ssd says, but is named after a block of imufmu, is built into the user's cache: in
-        Python, or with ``native`` as compiled C. An FMU that is there is taken as it is. Raises DescriptionError,
-        ArchiveError (FMU, archive or XML unfit), BuildError or WiringError (all misfits at once).
+        Python, or with ``native`` as compiled C. An FMU that is there is taken as it is. strict: refuse what breaks a
+        standard, also where its meaning is clear. Raises DescriptionError, ArchiveError (FMU, archive or XML unfit),
+        BuildError or WiringError (all misfits at once).
         """
         path = locate(path).resolve()
         if path.suffix.lower() != ".ssp":
-            return _read(path, native)
+            return _read(path, native, strict)
         scratch, delete = new_scratch("ssp")
         folder = str(scratch)
+
+        def shown(text: str) -> str:
+            """A user knows the archive, not the folder that it was unpacked to."""
+            return text.replace(f"{folder}{os.sep}", f"{path}: ")
+
         try:
             unpack(path, Path(folder))
             if not (Path(folder) / STRUCTURE).is_file():
                 raise ArchiveError(f"{path}: {STRUCTURE} is missing: this is no SSP")
-            system = replace(_read(Path(folder) / STRUCTURE, native, inside=Path(folder)), path=path)
+            system = _read(Path(folder) / STRUCTURE, native, strict, inside=Path(folder))
         except BaseException as error:
             delete()
-            # A user knows the archive, not the folder that it was unpacked to.
-            error.args = tuple(str(part).replace(f"{folder}{os.sep}", f"{path}: ") for part in error.args)
+            error.args = tuple(shown(str(part)) for part in error.args)
             raise
+        system = replace(system, path=path, notes=tuple(map(shown, system.notes)))
         weakref.finalize(system, delete)
         return system
 
     @property
-    def interfaces(self) -> dict[str, Interface]:
+    def interfaces(self) -> Mapping[str, Interface]:
         """What each component offers, by component name."""
-        return {part.name: _interface(part) for part in self.parts}
+        return self.wiring.interfaces
+
+    @property
+    def links(self) -> tuple[Link, ...]:
+        """Inputs and the outputs that feed them."""
+        return self.wiring.links
 
     def settings_with(self, parameters: Mapping[str, Any]) -> tuple[Setting, ...]:
         """The settings, with values by ``component.variable`` in force. Raises WiringError."""
         problems: list[str] = []
-        given = given_settings(parameters, self.interfaces, problems)
+        given = given_settings(parameters, self.wiring, problems)
         if problems:
             raise WiringError(self.path, problems)
         return merged(self.settings, given)
@@ -100,62 +113,81 @@ def locate(name: str | Path) -> Path:
     return systems[str(name)]
 
 
-def _read(path: Path, native: bool, inside: Path | None = None) -> System:
+def _read(path: Path, native: bool, strict: bool, inside: Path | None = None) -> System:
     """Read an .ssd; ``inside``: the folder that its files must not leave."""
     description = read_description(path, inside)
     _check_names(description)
+    faults = list(description.faults)
     models: dict[Path, Any] = {}
     parts = []
     for component in description.components:
-        fmu, ours = _fmu_file(component, path, native)
+        fmu, ours = _fmu_file(component, native)
         if fmu not in models:
-            models[fmu] = read_fmu(fmu)
-        parts.append(Part(component.name, fmu, models[fmu], ours))
-    interfaces = {part.name: _interface(part) for part in parts}
+            models[fmu] = read_fmu(fmu, faults)
+        parts.append(Part(component.name, fmu, _as_asked(models[fmu], component), ours))
+    interfaces = {part.name: Interface.of_model(part.name, part.model) for part in parts}
     problems = _instance_problems(parts)
     notes: list[str] = []
-    links = find_links(description, interfaces, problems, notes)
-    settings = bound_settings(description, interfaces, problems)
+    wiring = find_wiring(description, interfaces, problems, notes, faults)
+    settings = bound_settings(wiring, problems, faults)
+    faults = [fault.removeprefix(f"{path}, ") for fault in faults]
     if problems:
-        raise WiringError(path, problems)
-    notes += _idle_inputs(interfaces, links, settings)
-    return System(path, description, tuple(parts), links, settings, tuple(notes))
+        raise WiringError(path, [problem.removeprefix(f"{path}, ") for problem in problems])
+    if strict and faults:
+        raise WiringError(path, faults, "breaks a standard, and was to be read strictly")
+    notes += _idle_inputs(wiring, settings)
+    notes += [f"not as the standard has it: {fault}" for fault in faults]
+    return System(path, description, tuple(parts), wiring, settings, tuple(notes))
 
 
 def _check_names(description: Description) -> None:
-    names = [component.name for component in description.components]
-    if not names:
-        raise DescriptionError(f"{description.path}: the system has no components")
+    if not description.components:
+        raise DescriptionError(f"{description.path}: the system has no components, so there is nothing to run")
+    seen = set()
     for component in description.components:
-        where = f"{description.path}, line {component.line}: component {component.name!r}"
-        if "." in component.name:
-            raise DescriptionError(f"{where}: a name with a dot would be ambiguous in component.variable; rename it")
-        if names.count(component.name) > 1:
+        if component.name in seen or component.name in description.systems:
+            where = f"{component.where}: component {component.name!r}"
             raise DescriptionError(f"{where}: the name occurs twice; rename one of them")
+        seen.add(component.name)
 
 
-def _fmu_file(component: Component, path: Path, native: bool) -> tuple[Path, bool]:
+def _fmu_file(component: Component, native: bool) -> tuple[Path, bool]:
     """The component's FMU, built if it is one of ours and not there, and whether it is ours."""
     if component.source.is_file():
         return component.source, is_ours(component.source)
     if component.source.stem in BLOCKS:
         return (cached_native_fmu if native else cached_fmu)(component.source.stem), True
     raise DescriptionError(
-        f"{path}, line {component.line}: component {component.name!r}: there is no file {component.source}, and "
+        f"{component.where}: component {component.name!r}: there is no file {component.source}, and "
         + no_such("block of imufmu", component.source.stem, BLOCKS)
     )
 
 
-def _interface(part: Part) -> Interface:
-    return Interface(part.name, {variable.name: variable for variable in part.model.modelVariables})
+def _as_asked(model: Any, component: Component) -> Any:
+    """The ModelDescription (fmpy) with the kind of simulation that the description wants. Raises DescriptionError."""
+    offered = {"CoSimulation": model.coSimulation, "ModelExchange": model.modelExchange, "any": model}
+    if not offered.get(component.implementation):
+        raise DescriptionError(
+            f"{component.where}: component {component.name!r}: {component.implementation} is asked for; its FMU is for "
+            + kinds_of(model)
+        )
+    if component.implementation == "ModelExchange" and model.coSimulation:
+        model = copy(model)
+        model.coSimulation = None
+    return model
 
 
-def _idle_inputs(interfaces: Mapping[str, Interface], links: Sequence[Link], settings: Sequence[Setting]) -> list[str]:
-    """A note per component with inputs that nothing feeds and no parameter set gives a value."""
-    given = {(link.target[0], link.target[1].name) for link in links}
+def _idle_inputs(wiring: Wiring, settings: Sequence[Setting]) -> list[str]:
+    """What nothing feeds and no parameter set gives a value: connectors of systems, and a note per component."""
+    given = {(link.target[0], link.target[1].name) for link in wiring.links}
     given |= {(setting.component, setting.variable.name) for setting in settings}
     notes = []
-    for interface in interfaces.values():
+    for way in wiring.ways:
+        if way[-1] not in given:
+            source, target = (".".join(filter(None, node)) for node in (way[0], way[-1]))
+            notes.append(f"nothing gives {source} a value: {target} keeps its start value")
+            given.add(way[-1])
+    for interface in wiring.interfaces.values():
         idle = [v.name for v in interface.of("input") if (interface.component, v.name) not in given]
         if idle:
             notes.append(f"{interface.component}: not connected, at their start values: {', '.join(idle)}")

@@ -6,6 +6,7 @@ file and the member.
 
 from __future__ import annotations
 
+import re
 import stat
 import struct
 import xml.parsers.expat
@@ -97,11 +98,18 @@ def listed(problems: Sequence[str]) -> str:
     return f"{shown}; and {more} more" if more > 0 else shown
 
 
-def read_members(path: Path, wanted: Callable[[str], bool]) -> tuple[set[str], dict[str, bytes]]:
-    """Names of all members of an archive, and the content of the wanted ones. Raises ArchiveError."""
+def read_members(
+    path: Path, wanted: Callable[[str], bool], faults: list[str] | None = None
+) -> tuple[set[str], dict[str, bytes]]:
+    """Names of all members of an archive, and the content of the wanted ones. Raises ArchiveError.
+
+    Names begin with no "./". faults: gets what is harmless in the names, and odd.
+    """
     with _opened(path) as archive:
-        names = set(archive.namelist())
-        return names, {name: _read(archive, name, path) for name in sorted(names) if wanted(name)}
+        names = {_plain(name): name for name in archive.namelist()}
+        if faults is not None:
+            faults += _oddities(archive.namelist())
+        return set(names), {name: _read(archive, names[name], path) for name in sorted(names) if wanted(name)}
 
 
 @contextmanager
@@ -122,11 +130,11 @@ def _opened(path: Path) -> Iterator[zipfile.ZipFile]:
         seen: set[str] = set()
         for member in members:
             harm = _why_harmful(member)
-            if member.filename in seen:
+            if _plain(member.filename) in seen and not member.is_dir():
                 harm = "the name occurs twice"
             if harm:
                 raise ArchiveError(f"{path}: member {member.orig_filename!r} refused: {harm}")
-            seen.add(member.filename)
+            seen.add(_plain(member.filename))
         unpacked = sum(member.file_size for member in members)
         limit = min(LARGEST_UNPACKED, max(UNSUSPICIOUS, LARGEST_RATIO * path.stat().st_size))
         if unpacked > limit:
@@ -134,12 +142,27 @@ def _opened(path: Path) -> Iterator[zipfile.ZipFile]:
         yield archive
 
 
+def _plain(name: str) -> str:
+    return re.sub(r"^(\./)+", "", name)
+
+
+def _oddities(names: Sequence[str]) -> list[str]:
+    """What other programs may refuse in the names of members."""
+    folders = [name for name in names if name.endswith("/")]
+    oddities = {
+        "begins with ./": [name for name in names if name.startswith("./")],
+        "has a colon in its name, which Windows has not": [name for name in names if ":" in name],
+        "occurs twice": [name for name in dict.fromkeys(folders) if folders.count(name) > 1],
+    }
+    return [f"member {found[0]!r} {fault}" for fault, found in oddities.items() if found]
+
+
 def _why_harmful(member: zipfile.ZipInfo) -> str:
     """Why a member must not be unpacked; empty if it may."""
     name = member.orig_filename  # as stored; filename is cut at a zero byte
     if "\\" in name:
         return "a backslash in the name"
-    if name.startswith("/") or ":" in name:
+    if name.startswith("/") or re.match(r"(\./)*[A-Za-z]:", name):
         return "an absolute path"
     if ".." in name.split("/"):
         return "the path leaves the archive"

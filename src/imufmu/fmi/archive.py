@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import io
+import zipfile
+from contextlib import suppress
 from pathlib import Path, PurePosixPath
 from typing import Any
 
@@ -12,13 +15,13 @@ from ..files.archives import ArchiveError, listed, parse_xml, read_members, reas
 from .scalars import as_scalars
 
 
-def fmu_members(path: Path) -> tuple[set[str], Any]:
+def fmu_members(path: Path, faults: list[str] | None = None) -> tuple[set[str], Any]:
     """Names of the members of an FMU of any version and kind, and the root element (lxml) of its model description.
 
-    Raises ArchiveError.
+    faults: gets what is odd in the archive. Raises ArchiveError.
     """
     name = "modelDescription.xml"
-    names, content = read_members(path, lambda member: member == name)
+    names, content = read_members(path, lambda member: member == name, faults)
     if name not in names:
         raise ArchiveError(f"{path}: {name} is missing: this is no FMU")
     root = parse_xml(content[name], f"{path}: {name}")
@@ -27,13 +30,13 @@ def fmu_members(path: Path) -> tuple[set[str], Any]:
     return names, root
 
 
-def read_fmu(path: Path) -> Any:
+def read_fmu(path: Path, faults: list[str] | None = None) -> Any:
     """Checked ModelDescription (fmpy) of an FMU that this machine can run, its variables scalars as in FMI 2.0.
 
-    Raises ArchiveError unless it is FMI 2.0 or 3.0, for co-simulation or model exchange, with a binary for this
-    platform.
+    faults: gets what breaks the standard without hindering a run; None: that is an error, too. Raises ArchiveError
+    unless it is FMI 2.0 or 3.0, for co-simulation or model exchange, with a binary for this platform.
     """
-    names, model = read_model(path)
+    names, model = read_model(path, faults)
     if interface_of(model) is None:
         kind = "scheduled execution only" if model.scheduledExecution else "no kind of simulation"
         raise ArchiveError(f"{path}: for {kind}; expected co-simulation or model exchange. Export it for one of these")
@@ -44,22 +47,20 @@ def read_fmu(path: Path) -> Any:
     return model
 
 
-def read_model(path: Path) -> tuple[set[str], Any]:
+def read_model(path: Path, faults: list[str] | None = None) -> tuple[set[str], Any]:
     """Names of the members of an FMU 2.0 or 3.0 of any kind and platform, and its checked ModelDescription (fmpy).
 
-    Raises ArchiveError.
+    faults: as for read_fmu. Raises ArchiveError.
     """
     where = f"{path}: modelDescription.xml"
-    names, root = fmu_members(path)
+    odd: list[str] = []
+    names, root = fmu_members(path, odd)
+    if faults is not None:
+        faults += [f"{path}: {fault}" for fault in odd]
     version = root.get("fmiVersion")
     if version != "2.0" and not version.startswith("3.0"):
         raise ArchiveError(f"{path}: FMI {version}; expected FMI 2.0 or 3.0. Export it as one of these")
-    try:
-        return names, fmpy.read_model_description(str(path))
-    except ValidationError as error:
-        raise ArchiveError(f"{where}: {listed(error.problems)}") from error
-    except Exception as error:  # fmpy raises plain exceptions, and its parsing any ValueError or KeyError
-        raise ArchiveError(f"{where}: {reason(error)}") from error
+    return names, _described(path, where, faults)
 
 
 def interface_of(model: Any) -> Any:
@@ -67,12 +68,44 @@ def interface_of(model: Any) -> Any:
     return model.coSimulation or model.modelExchange
 
 
-def open_fmu(path: Path, folder: Path) -> tuple[Path, Any]:
-    """Check an FMU as read_fmu does and unpack it into an existing folder.
+def _described(path: Path, where: str, faults: list[str] | None) -> Any:
+    """ModelDescription (fmpy), also of an XML with faults, if those are asked for and it can be read."""
+    problems: list[str]
+    try:
+        return fmpy.read_model_description(_for_fmpy(path))
+    except ValidationError as error:
+        problems = error.problems
+    except Exception as error:  # fmpy raises plain exceptions, and its parsing any ValueError or KeyError
+        problems = [reason(error)]
+    if faults is not None:
+        with suppress(Exception):
+            description = fmpy.read_model_description(_for_fmpy(path), validate=False)
+            faults.append(f"{where}: {listed(problems)}")
+            return description
+    raise ArchiveError(f"{where}: {listed(problems)}")
 
-    Returns its shared library for this platform and its ModelDescription (fmpy).
+
+def _for_fmpy(path: Path) -> Any:
+    """The FMU, or where its members have names that FMPy does not look for, an archive of what it reads."""
+    name = "modelDescription.xml"
+    with zipfile.ZipFile(path) as archive:
+        if name in archive.namelist():
+            return str(path)
+    _, members = read_members(path, lambda member: member in (name, "sources/buildDescription.xml"))
+    content = io.BytesIO()
+    with zipfile.ZipFile(content, "w") as archive:
+        for member, text in members.items():
+            archive.writestr(member, text)
+    return content
+
+
+def open_fmu(path: Path, folder: Path, model: Any = None) -> tuple[Path, Any]:
+    """Check an FMU as read_fmu does, mildly, and unpack it into an existing folder.
+
+    model: what read_fmu gave, where it was asked already. Returns its shared library for this platform and its
+    ModelDescription (fmpy).
     """
-    description = read_fmu(path)
+    description = read_fmu(path, []) if model is None else model
     unpack(path, folder)
     return next(library for name in _library_names(description) if (library := folder / name).is_file()), description
 

@@ -23,7 +23,9 @@ from typing import Any
 import numpy as np
 
 from ..blocks.vocabulary import GRAVITY
-from ..cosim.description import NAMESPACES, DescriptionError, read_xml
+from ..cosim.ssp.files import DescriptionError
+from ..cosim.ssp.parameters import read_parameter_set
+from ..cosim.units import Unit, conversion
 from ..estimators.rizun2008 import mean_square_error, optimal_cutoff, tilt_variance
 from ..files.locations import models_folder
 from ..files.names import no_such
@@ -172,18 +174,21 @@ def bias_tilt(omega_g: Any, bias: Any) -> Any:
 def gyro_noise_density_of(imu: str | Path) -> float:
     """Gyroscope noise density (rad/s/sqrt(Hz)) of a parameter set: a name in models/imus, or an .ssv file.
 
-    Raises ValueError where there is no such device, DescriptionError where the file does not tell.
+    Raises ValueError where there is no such device, DescriptionError where the file does not tell, or in another kind
+    of unit.
     """
     folder = models_folder() / "imus"
     path = Path(imu) if Path(imu).suffix.lower() == ".ssv" else folder / f"{imu}.ssv"
     if not path.is_file():
         known = sorted(known.stem for known in folder.glob("*.ssv"))
         raise ValueError(no_such("device", str(imu), known, "or give an .ssv file"))
-    root = read_xml(path, "SystemStructureParameterValues")
-    value = root.find("ssv:Parameters/ssv:Parameter[@name='gyro_noise_density']/ssv:Real", NAMESPACES)
-    if value is None:
+    values = [value for value in read_parameter_set(path) if value.name == "gyro_noise_density"]
+    if not values:
         raise DescriptionError(f"{path}: sets no gyro_noise_density")
-    return float(value.get("value"))
+    try:
+        return conversion(values[-1].unit, Unit("rad/s/sqrt(Hz)"))(float(values[-1].value))
+    except ValueError as error:
+        raise DescriptionError(f"{values[-1].where}: gyro_noise_density: {error}") from error
 
 
 def predict(imu: str | Path | float, slosh: float, g: float = GRAVITY) -> Table:
