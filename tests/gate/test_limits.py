@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from imufmu.gate.limits import LimitsError, components, read_limits, required
+from support.places import ROOT
 
 GOOD = """
 system = "roundabout.ssd"
@@ -135,6 +136,13 @@ def test_a_limit_of_the_command_line_is_a_statistic_or_a_condition(
 
 def test_at_least_is_written_with_the_other_sign() -> None:
     assert str(required("plant.speed.highest > 50 km/h").at_least) == "50 km/h"
+
+
+def test_the_limits_file_of_the_documentation_is_one(tmp_path: Path) -> None:
+    page = (ROOT / "docs" / "gate.md").read_text(encoding="utf-8")
+    (block,) = re.findall(r"```toml\n(.*?)```", page, re.DOTALL)
+    limits = read_limits(written(tmp_path, block)).limits
+    assert [limit.kind for limit in limits] == ["statistic", "always", "eventually"]
 
 
 def test_the_schema_for_editors_names_every_key_and_what_it_is() -> None:

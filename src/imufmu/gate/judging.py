@@ -98,11 +98,19 @@ def _condition(limit: Limit, table: Table, rows: np.ndarray) -> Finding:
             begins = rows[:1]
         until = limit.within if limit.within is not None else math.inf
         robustness = statistics.within(table.time[: rows[-1] + 1], robustness[: rows[-1] + 1], until)
-    unit = value.unit or "1"
+    unit, factor = shown(value.unit)
     if not begins.size:
         return Finding(math.inf, unit, math.inf, float(table.time[rows[0]]))
     worst = begins[np.argmin(robustness[begins])]
-    return Finding(float(robustness[worst]), unit, float(robustness[worst]), float(table.time[worst]))
+    least = factor * float(robustness[worst])
+    return Finding(least, unit, least, float(table.time[worst]))
+
+
+def shown(unit: str | None) -> tuple[str, float]:
+    """The unit that a person is shown, and the factor to it: degrees for radians."""
+    if unit in ("rad", "rad/s"):
+        return unit.replace("rad", "deg"), float(np.rad2deg(1.0))
+    return unit or "1", 1.0
 
 
 def _reduced(limit: Limit, table: Table, value: Quantity, rows: np.ndarray, unit: str) -> statistics.Reduced:

@@ -14,11 +14,13 @@ from matplotlib.figure import Figure
 
 from .. import __version__
 from ..blocks.drawing import Drawing
+from ..cosim.errors import SimulationError
 from ..files.atomic import atomic_write
 from ..reports.page import Section, write_report
 from ..scoring.checks import limit_text, margin_text, value_text
 from ..scoring.table import Table as TextTable
 from .judging import bound_in
+from .judging import shown as in_shown_unit
 from .limits import Limit
 from .table import Table
 from .trials import Plan
@@ -29,17 +31,11 @@ _BROKEN = "#d55e00"  # of Okabe and Ito: told apart by the colour-blind, too
 
 def verdict_table(outcome: Outcome) -> TextTable:
     """A row per limit."""
-    rows = [
-        [
-            check.name,
-            "holds" if check.passed else "BROKEN",
-            value_text(check),
-            limit_text(check),
-            margin_text(check),
-            check.where,
-        ]
-        for check in outcome.checks
-    ]
+    rows = []
+    for check in outcome.checks:
+        margin = margin_text(check) if check.limit else ""  # no part of nothing
+        found = ("holds" if check.passed else "BROKEN", value_text(check), limit_text(check), margin)
+        rows.append([check.name, *found, check.where])
     return TextTable(["limit", "verdict", "value", "limit", "margin", "where it was worst"], rows, words=True)
 
 
@@ -79,16 +75,16 @@ def _finite(value: Any) -> Any:
 
 def write_page(path: Path, plan: Plan, limits: Sequence[Limit], outcome: Outcome) -> None:
     """The verdict and, per limit, the run that decided it, which is made once more. Raises WriteError."""
-    sections = [Section("Verdict", summary(outcome), verdict_table(outcome), points=outcome.notes)]
+    sections = [Section("Verdict", "", verdict_table(outcome), points=outcome.notes)]
     system = plan.read()
     tables: dict[int | None, Table] = {}
     for limit, check, seed in zip(limits, outcome.checks, outcome.worst, strict=True):
-        text = f"{value_text(check)}, limit {limit_text(check)}, margin {margin_text(check)}. {check.reason}".strip()
+        text = f"{value_text(check)}, limit {limit_text(check)}. {check.reason}".strip()
         try:
             if seed not in tables:
                 tables[seed] = Table(plan.run(system, seed))
             figure = _figure(limit, tables[seed])
-        except ValueError as error:  # the run failed, which is the finding
+        except (ValueError, SimulationError) as error:  # the run failed, which is the finding
             sections.append(Section(check.name, f"{text} {error}", level=3))
             continue
         caption = "Rows that break the limit are shaded." + ("" if seed is None else f" Seed {seed}.")
@@ -99,14 +95,12 @@ def write_page(path: Path, plan: Plan, limits: Sequence[Limit], outcome: Outcome
 def _figure(limit: Limit, table: Table) -> Figure:
     """The quantity over time, or of a condition its distance from turning, with the rows that break it."""
     value = limit.quantity.evaluate(table)
-    shown = value.values if value.robustness is None else value.robustness
-    shown = np.where(value.known, np.broadcast_to(shown, table.time.shape), np.nan)
-    unit, factor = value.unit or "1", 1.0
-    if unit in ("rad", "rad/s"):
-        unit, factor = unit.replace("rad", "deg"), np.rad2deg(1.0)
+    drawn = value.values if value.robustness is None else value.robustness
+    drawn = np.where(value.known, np.broadcast_to(drawn, table.time.shape), np.nan)
+    unit, factor = in_shown_unit(value.unit)
     figure = Drawing(figsize=(8, 2.6), layout="constrained")
     axis = figure.subplots()
-    axis.plot(table.time, factor * shown, linewidth=1.0, color="#0072b2")
+    axis.plot(table.time, factor * drawn, linewidth=1.0, color="#0072b2")
     broken = _broken(limit, table)
     if broken.any():
         low, high = axis.get_ylim()

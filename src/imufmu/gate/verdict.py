@@ -117,7 +117,9 @@ class _Tally:
                 share = self._passed / (self._passed + self._failed)
             return Check(limit.name, 100 * share, 100 * demand.part, False, "%", limit.reason, f"{counted}; {where}")
         if self._worst is None:
-            return Check(limit.name, math.nan, 0.0, True, "1", self._reason, where)
+            return Check(
+                limit.name, math.nan, 0.0, True, "1", limit.reason, ": ".join(filter(None, (where, self._reason)))
+            )
         bound, at_most = self._bound(self._worst)
         return Check(limit.name, self._worst.value, bound, at_most, self._worst.unit, limit.reason, where)
 
