@@ -17,7 +17,8 @@ from scipy.spatial.transform import Rotation
 
 from imufmu.benchmarks import peers
 from imufmu.benchmarks.contenders import FOR_REAL_RECORDINGS, TILT_TIME, with_real_parameters
-from imufmu.benchmarks.recordings import DELAY, Benchmark, benchmark, tables, write_scores
+from imufmu.benchmarks.recordings import DELAY, Benchmark, benchmark
+from imufmu.benchmarks.summary import tables, write_scores
 from imufmu.compiled.running import run
 from imufmu.cosim.replay import estimator_fmu, replay
 from imufmu.estimators import plumb
@@ -29,7 +30,7 @@ from support.optional import needs
 from support.places import ROOT
 
 PEERS = {contender.name: contender for contender in peers.peers()}
-needs_peers = needs("vqf", "imufusion")
+needs_peers = needs("vqf", "imufusion", "riann")
 
 G = 9.81
 PERIOD = 0.005
@@ -109,7 +110,7 @@ def test_gyro_bias_of_the_rest_is_removed_for_real_recordings_only(folder: Path)
 def test_a_start_in_motion_is_not_taken_for_rest(tmp_path: Path, rest: float) -> None:
     write_csv(tmp_path / "moving.csv", rocking(rest=rest))
     result = benchmark(tmp_path, ["rizun2008"])
-    assert list(result.notes) == ["moving: its first 3 s are no rest; gyro bias left in"]
+    assert list(result.notes) == ["no rest in the first 3 s, so gyro bias left in: moving"]
     untouched = benchmark(tmp_path, ["rizun2008"], rest=0.0)
     assert rmse_of(result, "rizun2008", "moving", real=True) == rmse_of(untouched, "rizun2008", "moving", real=True)
 
@@ -158,14 +159,20 @@ def test_a_constant_bias_tilts_every_paper_by_the_same_time(contender: Any) -> N
 
 
 @needs_peers
-@pytest.mark.parametrize("name", ["VQF", "BasicVQF", "imufusion"])
+@pytest.mark.parametrize("name", ["VQF", "BasicVQF", "imufusion", "RIANN"])
 def test_peers_report_the_up_vector_of_a_moving_sensor(name: str) -> None:
     columns = rocking()
     up = PEERS[name].estimate(columns, PERIOD)["vertical"]
     true_up = np.column_stack([0 * columns["roll"], np.sin(columns["roll"]), np.cos(columns["roll"])])
-    settled = columns["time"] > REST  # imufusion starts upright
+    settled = columns["time"] > REST  # imufusion and RIANN start upright
     error = np.rad2deg(metrics.inclination_error(up[settled], true_up[settled]))
-    assert error.max() < 1  # wrong axes or signs would give tens
+    assert error.max() < 2  # wrong axes or signs would give tens; RIANN, which is learnt, has 1
+
+
+@needs_peers
+def test_a_filter_can_be_left_out(folder: Path) -> None:
+    result = benchmark(folder, ["rizun2008"], without=["RIANN", "imufusion"])
+    assert {s.contender for s in result.scores} == {"rizun2008", "VQF", "BasicVQF"}
 
 
 def test_without_the_peers_the_estimators_are_scored_alone(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -192,7 +199,6 @@ def test_groups_are_means_over_their_recordings(folder: Path) -> None:
 
 def test_without_groups_every_recording_is_a_row(folder: Path) -> None:
     section = tables(benchmark(folder, ["rizun2008"], delay=0.0))
-    assert len(section) == 3
     assert [row[0] for row in section[0].table.rows] == ["mean of 2", "calm", "drifting"]
 
 
@@ -205,10 +211,12 @@ def test_nees_is_the_squared_error_over_the_squared_tilt_std(folder: Path) -> No
     found = [s.nees for s in result.scores if (s.contender, s.recording) == ("plumb", "drifting")]
     assert found == pytest.approx([expected] * 2, rel=1e-12)  # plumb has one set of parameters for both contests
     assert math.isnan(next((s.nees for s in result.scores if s.contender == "VQF"), math.nan))
-    honesty = tables(result)[-1]
-    assert honesty.heading.startswith("NEES")
-    assert [row[:1] for row in honesty.table.rows] == [["calm"], ["drifting"]]
-    assert honesty.table.rows[1][1] == f"{expected:.2f}"
+    (honesty,) = (section for section in tables(result) if section.heading.startswith("NEES"))
+    rows = dict(honesty.table.rows)
+    assert list(rows)[:3] == ["mean of 2", "calm", "drifting"] and rows["drifting"] == f"{expected:.2f}"
+    values = [s.nees for s in result.scores if s.contest == result.judged]
+    assert rows["recordings below 0.3"] == str(sum(value < 0.3 for value in values))
+    assert rows["largest"] == f"{max(values):.2f}"
 
 
 def test_the_heading_is_scored_where_there_is_a_magnetometer(tmp_path: Path) -> None:
@@ -225,7 +233,7 @@ def test_the_heading_is_scored_where_there_is_a_magnetometer(tmp_path: Path) -> 
     assert scores["plumb"].rmse_deg == pytest.approx(math.degrees(0.1), abs=0.1)  # the filter's own lag
     assert scores["plumb"].aligned_rmse_deg < 0.1
     table = tables(result)[-1].table
-    assert table.columns[1:3] == ["plumb", "plumb, aligned"]
+    assert table and table.columns[1:3] == ["plumb", "plumb, aligned"]
     assert table.rows[-1][:2] == ["nine", f"{scores['plumb'].rmse_deg:.2f}"]
 
 
@@ -246,11 +254,13 @@ def test_only_trials_of_broad_are_taken_for_recorded_with_its_delay(folder: Path
     delays = {name: {s.delay for s in result.scores if s.recording == name} for name in ("trial", "calm", "drifting")}
     assert delays == {"trial": {0.0, DELAY}, "calm": {0.0}, "drifting": {0.0}}
     sections = {section.heading: section for section in tables(result)}
-    (delayed,) = (s for heading, s in sections.items() if "papers, truth delayed by 2.3 ms" in heading)
+    (delayed,) = (
+        s for heading, s in sections.items() if "papers, truth delayed by 2.3 ms where it is BROAD's" in heading
+    )
     assert delayed.points[0].endswith("ms before: in every trial of BROAD it is ahead by that")
-    assert [row[0] for row in delayed.table.rows] == ["mean of 1", "trial"]
-    honesty = next(s for heading, s in sections.items() if heading.startswith("NEES"))
-    assert [row[0] for row in honesty.table.rows] == ["calm", "drifting", "trial"]
+    assert [row[0] for row in delayed.table.rows] == ["mean of 3", "calm", "drifting", "trial"]
+    own = {(s.recording, s.delay) for s in result.scores if s.own}
+    assert own == {("trial", DELAY), ("calm", 0.0), ("drifting", 0.0)}
 
 
 def test_the_csv_file_holds_every_score_bit_for_bit(folder: Path, tmp_path: Path) -> None:
@@ -301,9 +311,21 @@ def test_a_users_mistake_is_one_clear_message_and_exit_code_2(imufmu, tmp_path):
     write_csv(tmp_path / "untrue" / "walk.csv", {k: v for k, v in rocking().items() if k not in ("roll", "pitch")})
     (tmp_path / "torn").mkdir()
     (tmp_path / "torn" / "trials.json").write_text('{"groups": 3}')
+    (tmp_path / "torn" / "walk.csv").write_text("")
     for arguments, expected in (
-        (["none"], "none: cannot list the folder"),
-        (["untrue/walk.csv"], "walk.csv: cannot list the folder"),
+        (["none"], "none: no such file or folder"),
+        (["empty", "none"], "none: no such file or folder"),
+        (["none/*.csv"], "none/*.csv: no file and no folder fits this pattern"),
+        (["untrue/walk.csv"], "walk.csv: no true attitude"),
+        (["untrue", "--group", "("], "not a regular expression"),
+        (["untrue", "--group", "stairs"], "'stairs': fits no recording, as untrue/walk.csv"),
+        (["untrue", "--set", "gyro_index=1"], "name estimator and parameter, as plumb.gyro_index"),
+        (["untrue", "--set", "plum.gyro_index=1"], "did you mean plumb?"),
+        (["untrue", "--set", "plumb.gyro=1"], "gyro: unknown; plumb has"),
+        (["untrue", "--set", "plumb.gyro_index=9"], "gyro_index = 9 is outside [0, 3]"),
+        (["untrue", "--json", "s.txt"], ".json"),
+        (["untrue", "--without", "plum"], "no filter is called 'plum'"),
+        (["untrue", "--csv", "untrue/walk.csv"], "it is read here"),
         (["empty"], "empty: no recording to score"),
         (["untrue"], "walk.csv: no true attitude"),
         (["torn"], "trials.json: not the list of trials"),
@@ -326,7 +348,7 @@ def test_two_trials_of_broad_score_as_replayed(tmp_path, broad):
     for trial in ("01_undisturbed_slow_rotation_A", "15_undisturbed_fast_translation_A"):
         (tmp_path / f"{trial}.mat").symlink_to(broad / f"{trial}.mat")
     (tmp_path / "trials.json").symlink_to(broad / "trials.json")
-    result = benchmark(tmp_path, ["lee2012"])
+    result = benchmark(tmp_path, ["lee2012"], without=PEERS)
     assert rmse_of(result, "lee2012", "01_undisturbed_slow_rotation_A") == pytest.approx(0.832, abs=5e-4)
     assert rmse_of(result, "lee2012", "15_undisturbed_fast_translation_A") == pytest.approx(15.626, abs=5e-4)
     assert list(result.groups)[:3] == ["all_trials", "undisturbed", "rotation"]

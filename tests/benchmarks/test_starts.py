@@ -9,8 +9,10 @@ import numpy as np
 import pytest
 
 from imufmu.benchmarks.contenders import Contender
-from imufmu.benchmarks.recordings import benchmark, tables
+from imufmu.benchmarks.recordings import benchmark
+from imufmu.benchmarks.sources import Source
 from imufmu.benchmarks.starts import start_scores, start_tables, starts
+from imufmu.benchmarks.summary import tables
 from imufmu.files.csv_table import write_csv
 from imufmu.recordings.reading import Recording, read
 
@@ -56,7 +58,8 @@ def test_a_filter_sees_nothing_from_before_its_start(recording: Recording) -> No
         return {"vertical": np.tile(readings["accel"][0] / G, (len(readings["accel"]), 1))}
 
     vertical = recording.truth["vertical"]
-    scores = list(start_scores(recording, vertical, 3, [Contender("stubborn", estimate, {})]))
+    source = Source(recording.path, "rocking", [])
+    scores = list(start_scores(source, recording, vertical, 3, [Contender("stubborn", estimate, {})]))
     for score, first in zip(scores, seen, strict=True):
         row = round(score.instant / PERIOD)
         assert np.allclose(first, recording.accel[row], atol=0)
@@ -69,7 +72,7 @@ def test_a_filter_sees_nothing_from_before_its_start(recording: Recording) -> No
         assert score.later_max_deg == pytest.approx(late.max(), abs=1e-3)
         assert score.later_near == pytest.approx(np.mean(late < 2), abs=0.002)
     (section,) = start_tables(scores)
-    assert section.table and section.table.columns[1:] == ["stubborn"] and len(section.table.rows) == 4
+    assert section.table and section.table.columns[1:] == ["stubborn"] and len(section.table.rows) == 6
 
 
 def test_the_benchmark_begins_there_when_asked(recording: Recording) -> None:

@@ -59,6 +59,7 @@ def _libpython() -> str:
 
 _PARTS: dict[str, Callable[[], str]] = {
     "imufusion": lambda: _package("imufusion"),
+    "riann": lambda: _package("riann") or _package("onnxruntime"),
     "vqf": lambda: _package("vqf"),
     "pandas": lambda: _package("pandas"),
     "xarray": lambda: _package("xarray"),

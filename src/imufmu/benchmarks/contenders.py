@@ -9,17 +9,21 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 
 from ..blocks.block import SampledBlock
-from ..blocks.vocabulary import ACCEL, GYRO, MAG, VERTICAL
+from ..blocks.running import Trajectory
+from ..blocks.vocabulary import ACCEL, FORWARD_SPEED, GYRO, MAG, VERTICAL
+from ..compiled.offline import run_offline
 from ..compiled.running import run
 from ..files.names import no_such
 from ..registry import ESTIMATORS
 
-Readings = Mapping[str, np.ndarray]  # by signal name, (n, 3), NaN where missing
+Readings = Mapping[str, np.ndarray]  # by signal name, (n, 3) or (n,), NaN where missing
+Settings = Mapping[str, Any]  # values by estimator.parameter
 
 TILT_TIME = 3.0  # s; a constant gyroscope bias b ends up as a tilt of TILT_TIME * b
 
@@ -64,20 +68,60 @@ class Contender:
     finds_bias: bool = False
 
 
-def with_papers_parameters(names: Sequence[str] = ()) -> list[Contender]:
-    """The estimators of these names, or all that need no more than gyroscope and accelerometer. Raises ValueError."""
+def with_papers_parameters(names: Sequence[str] = (), settings: Settings = MappingProxyType({})) -> list[Contender]:
+    """The estimators of these names, or all that need no more than gyroscope and accelerometer.
+
+    settings: values by estimator.parameter that replace those of the paper. Raises ValueError.
+    """
     found = []
     for block in _blocks(names):
-        found.append(_contender(block, {}))
+        own = _own(block, settings)
+        found.append(_contender(block, own))
         for variant in _VARIANTS.get(block.name, ()):
             label = " ".join(f"{name}={value}" for name, value in variant.items())
-            found.append(_contender(block, variant, f"{block.name} {label}"))
+            found.append(_contender(block, {**own, **variant}, f"{block.name} {label}"))
     return found
 
 
-def with_real_parameters(names: Sequence[str] = ()) -> list[Contender]:
+def with_real_parameters(names: Sequence[str] = (), settings: Settings = MappingProxyType({})) -> list[Contender]:
     """The same estimators with parameters for real recordings; as they are where no others are known."""
-    return [_contender(block, FOR_REAL_RECORDINGS.get(block.name, {})) for block in _blocks(names)]
+    return [_with_real(block, settings) for block in _blocks(names)]
+
+
+def with_wheels(names: Sequence[str] = (), settings: Settings = MappingProxyType({})) -> list[Contender]:
+    """Those among them that take the speed of a vehicle's wheels."""
+    return [_with_real(block, settings) for block in _blocks(names) if FORWARD_SPEED in block.inputs]
+
+
+def offline_contenders(names: Sequence[str] = (), settings: Settings = MappingProxyType({})) -> list[Contender]:
+    """Those among them that find a bias, with the whole record before them."""
+    found = [c for c in with_real_parameters(names, settings) if c.finds_bias]
+    blocks = {block.name: block for block in _blocks(names)}
+    return [
+        Contender(f"{c.name} offline", partial(_estimate, blocks[c.name], c.parameters, runs=run_offline), c.parameters)
+        for c in found
+    ]
+
+
+def check_settings(settings: Settings) -> None:
+    """Raises ValueError for an estimator or a parameter that is none, and a value that cannot be."""
+    blocks = {block.name: block for block in _of_tilt()}
+    for key, value in settings.items():
+        owner, dot, name = key.partition(".")
+        if not dot:
+            raise ValueError(f"{key}: name estimator and parameter, as plumb.{key}")
+        if owner not in blocks:
+            raise ValueError(no_such("estimator of tilt", owner, blocks))
+        blocks[owner].parameter_vector({name: value})
+
+
+def _own(block: SampledBlock, settings: Settings) -> dict[str, Any]:
+    """Values by parameter, of one estimator."""
+    return {key.partition(".")[2]: value for key, value in settings.items() if key.partition(".")[0] == block.name}
+
+
+def _with_real(block: SampledBlock, settings: Settings) -> Contender:
+    return _contender(block, {**FOR_REAL_RECORDINGS.get(block.name, {}), **_own(block, settings)})
 
 
 def _blocks(names: Sequence[str]) -> list[SampledBlock]:
@@ -88,10 +132,12 @@ def _blocks(names: Sequence[str]) -> list[SampledBlock]:
     return [six_axis[name] for name in dict.fromkeys(names)] or list(six_axis.values())
 
 
-def with_magnetometer() -> list[Contender]:
+def with_magnetometer(settings: Settings = MappingProxyType({})) -> list[Contender]:
     """The estimators of heading, with parameters for real recordings: North is where the field points."""
     return [
-        _contender(block, _FIELD_OF_THE_RECORDING.get(block.name, {})) for block in _of_tilt() if MAG in block.inputs
+        _contender(block, {**_FIELD_OF_THE_RECORDING.get(block.name, {}), **_own(block, settings)})
+        for block in _of_tilt()
+        if MAG in block.inputs
     ]
 
 
@@ -109,7 +155,11 @@ def _contender(block: SampledBlock, parameters: Mapping[str, Any], name: str = "
 
 
 def _estimate(
-    block: SampledBlock, parameters: Mapping[str, Any], readings: Readings, sample_period: float
+    block: SampledBlock,
+    parameters: Mapping[str, Any],
+    readings: Readings,
+    sample_period: float,
+    runs: Callable[..., Trajectory] = run,
 ) -> Mapping[str, np.ndarray]:
     inputs = {signal.name: readings[signal.name] for signal in block.inputs if signal.name in readings}
-    return run(block, inputs, {"sample_period": sample_period, **parameters}).values
+    return runs(block, inputs, {"sample_period": sample_period, **parameters}).values

@@ -19,6 +19,7 @@ from ..reports.page import Section
 from ..scoring import metrics
 from ..scoring.table import Table
 from .contenders import Contender
+from .sources import Source, grouped
 
 
 @dataclass(frozen=True)
@@ -32,9 +33,7 @@ class HeadingScore:
     aligned_rmse_deg: float
 
 
-def heading_scores(
-    recording: Recording, groups: Sequence[str], contenders: Sequence[Contender]
-) -> Iterator[HeadingScore]:
+def heading_scores(source: Source, recording: Recording, contenders: Sequence[Contender]) -> Iterator[HeadingScore]:
     """Every filter on a recording with a magnetometer and a true attitude; nothing otherwise."""
     truth, readings = recording.truth.get("q_NS"), recording.at_instants()
     if truth is None or "mag" not in readings:
@@ -45,7 +44,7 @@ def heading_scores(
         error = metrics.heading_error(q_NS[counts], truth[counts])
         mean = np.angle(np.mean(np.exp(1j * error)))
         both = (np.rad2deg(metrics.rms(e)) for e in (error, metrics.angle_difference(error, mean)))
-        yield HeadingScore(contender.name, recording.name, groups, *map(float, both))
+        yield HeadingScore(contender.name, source.name, source.groups, *map(float, both))
 
 
 def heading_tables(scores: Sequence[HeadingScore], groups: Sequence[str]) -> list[Section]:
@@ -65,11 +64,8 @@ def heading_tables(scores: Sequence[HeadingScore], groups: Sequence[str]) -> lis
             ]
         return [label, *cells]
 
-    rows = [row(f"mean of {len(recordings)}", set(recordings))]
-    for group in groups:
-        members = {s.recording for s in scores if group in s.groups}
-        if 0 < len(members) < len(recordings):
-            rows.append(row(f"{group} ({len(members)})", members))
+    groups_of = {s.recording: s.groups for s in scores}
+    rows = [row(label, members) for label, members in grouped(groups_of, groups)]
     rows += [row(name, {name}) for name in recordings]
     header = [column for name in contenders for column in (name, f"{name}, aligned")]
     return [

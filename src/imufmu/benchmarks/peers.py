@@ -2,13 +2,16 @@
 
 VQF, BasicVQF: Laidig, Seel, Information Fusion 91, 2023, doi:10.1016/j.inffus.2022.10.014; package ``vqf``.
 imufusion: the revised filter of Madgwick's thesis (2014), chapter 7; package ``imufusion``.
+RIANN: Weber, Gühmann, Seel, AI 2, 2021, doi:10.3390/ai2030028, a recurrent neural network; packages ``riann``,
+``onnxruntime``.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from functools import partial
+from functools import cache, partial
 from importlib.util import find_spec
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -35,7 +38,14 @@ def peers() -> list[Contender]:
         found.append(Contender("BasicVQF", partial(_vqf, "BasicVQF"), {}))
     if find_spec("imufusion"):
         found.append(Contender("imufusion", _imufusion, _FUSION_SETTINGS))
+    if find_spec("riann") and find_spec("onnxruntime"):
+        found.append(Contender("RIANN", _riann, {}))
     return found
+
+
+def offline_peers() -> list[Contender]:
+    """The same, of filters that want the whole record before they begin."""
+    return [Contender("offlineVQF", _vqf_offline, {}, finds_bias=True)] if find_spec("vqf") else []
 
 
 def heading_peers() -> list[Contender]:
@@ -58,6 +68,12 @@ def _vqf(kind: str, readings: Readings, sample_period: float) -> Mapping[str, np
     return {"vertical": vertical_of(result["quat6D"])}
 
 
+def _vqf_offline(readings: Readings, sample_period: float) -> Mapping[str, np.ndarray]:
+    import vqf
+
+    return {"vertical": vertical_of(vqf.offlineVQF(*_complete(readings), None, sample_period)["quat6D"])}
+
+
 def _imufusion(readings: Readings, sample_period: float) -> Mapping[str, np.ndarray]:
     import imufusion
 
@@ -70,6 +86,19 @@ def _imufusion(readings: Readings, sample_period: float) -> Mapping[str, np.ndar
         ahrs.update_no_magnetometer(degrees_per_second, in_g)
         vertical[k] = ahrs.get_gravity()  # what an accelerometer would read at rest: up
     return {"vertical": vertical}
+
+
+def _riann(readings: Readings, sample_period: float) -> Mapping[str, np.ndarray]:
+    gyro, accel = _complete(readings)
+    return {"vertical": vertical_of(_network().predict(accel, gyro, fs=1 / sample_period).astype(float))}
+
+
+@cache
+def _network() -> Any:
+    """The trained network, read once."""
+    import riann
+
+    return riann.RIANN(str(Path(riann.__file__).with_name("riann.onnx")))  # by itself 0.2.0 looks in the wrong place
 
 
 def _complete(readings: Readings) -> tuple[np.ndarray, np.ndarray]:

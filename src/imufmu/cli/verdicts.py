@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from .arguments import check_target
+from .arguments import check_target, parsed_sets
 from .console import err, notes, out, print_table, progress_bar, written
 
 if TYPE_CHECKING:
@@ -73,10 +74,23 @@ def _tell_of_one(verdict: Verdict) -> None:
 
 
 def benchmark(
-    folder: Annotated[Path, typer.Argument(help="Folder with recordings that know the truth: .csv, or .mat of BROAD")],
+    places: Annotated[
+        list[str],
+        typer.Argument(metavar="PLACE...", help="Folders, files or patterns: .csv that know the truth, .mat of BROAD"),
+    ],
     estimators: Annotated[
         list[str] | None, typer.Option("--estimator", "-e", help="Name of an estimator; all without. Repeatable.")
     ] = None,
+    without: Annotated[
+        list[str] | None, typer.Option("--without", help="Name of a filter to leave out, as RIANN, the slowest.")
+    ] = None,
+    sets: Annotated[
+        list[str] | None,
+        typer.Option("--set", metavar="NAME=VALUE", help="Parameter, as plumb.gyro_index=1. Repeatable."),
+    ] = None,
+    group: Annotated[
+        str, typer.Option("--group", metavar="REGEX", help="What of a path is the group; without, its folder is.")
+    ] = "",
     delay: Annotated[
         float | None,
         typer.Option(
@@ -91,26 +105,38 @@ def benchmark(
     starts: Annotated[
         int, typer.Option(min=0, max=1000, help="Begin so often inside the motion of each recording, too.")
     ] = 0,
+    offline: Annotated[
+        bool, typer.Option("--offline", help="Score once more with the whole record known, beside offlineVQF.")
+    ] = False,
     csv: Annotated[Path | None, typer.Option("--csv", help="Write every score to this .csv file.")] = None,
+    json: Annotated[Path | None, typer.Option("--json", help="Write everything to this .json file.")] = None,
 ) -> None:
-    """Score every estimator of tilt on real recordings, beside VQF and imufusion where those are installed.
+    """Score every estimator of tilt on real recordings, beside VQF, imufusion and RIANN where those are installed.
 
     \b
       imufmu benchmark broad
-      imufmu benchmark broad --estimator rizun2008 --delay 0 --csv scores.csv
-      imufmu benchmark broad --starts 6
+      imufmu benchmark broad walks "cars/*/slow_*.csv" --starts 6 --json scores.json
+      imufmu benchmark broad --estimator plumb --set plumb.gyro_index=1 --csv scores.csv
+      imufmu benchmark walks --group "(stairs|street)"
 
-    Twice: with the parameters of the papers, then with parameters for real recordings. For the columns of a .csv file
-    see imufmu replay --help.
+    Twice: with the parameters of the papers, then with parameters for real recordings, which all that follows is about:
+    the ratio to VQF, the worst recordings, how honest tilt_std is, starts inside a motion, the heading. For the columns
+    of a .csv file see imufmu replay --help.
     """
     from ..benchmarks.recordings import benchmark as score
-    from ..benchmarks.recordings import recordings_in, tables, write_scores
+    from ..benchmarks.sources import sources
+    from ..benchmarks.summary import tables, write_json, write_scores
 
-    check_target(csv, ".csv", inputs=recordings_in(folder))
-    with progress_bar(f"scoring {folder}") as progress:
-        result = score(folder, estimators or (), delay=delay, rest=rest_bias, starts=starts, progress=progress)
+    inputs = [source.path for source in sources(places, group).files]
+    check_target(csv, ".csv", inputs=inputs)
+    check_target(json, ".json", inputs=inputs)
+    begin = partial(score, delay=delay, rest=rest_bias, starts=starts, group=group, offline=offline)
+    with progress_bar(f"scoring {', '.join(places)}") as progress:
+        result = begin(places, estimators or (), without=without or (), settings=parsed_sets(sets), progress=progress)
     if csv:
         write_scores(csv, result)
+    if json:
+        write_json(json, result)
     notes(result.notes)
     for section in tables(result):
         out.print(section.heading, markup=False)
@@ -119,7 +145,7 @@ def benchmark(
         if section.table:
             print_table(section.table)
         out.print()
-    written(csv)
+    written(csv, json)
 
 
 def predict(

@@ -126,7 +126,7 @@ def end_at_start(x: SimpleNamespace, u: SimpleNamespace, p: SimpleNamespace) -> 
     H = block_length(x, p)
     after = start.end_of_block(x, H, p)
     rests = ca.logic_not(after["coarse"]) * rest.at_rest(x) * (x.still_time >= p.rr_s)
-    field, present = heading.first_heading(after["q"], 1, u, p), heading.is_there(u, ca.logic_not(u.mag_missing))
+    field, present = heading.first_heading(after["q"], 1, u, p), heading.is_there(u)
     # A turn as large as those at the start would make nonsense of what was learnt about the heading.
     anew = {name: ca.if_else(present, value, getattr(x, name)) for name, value in field.items()}
     lost = ca.if_else(ca.logic_and(after["coarse"], x.lost > 0), x.lost, ca.fmax(x.lost - H, 0))
