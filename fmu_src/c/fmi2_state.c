@@ -1,6 +1,9 @@
 /* FMI functions: the whole state, kept in memory or as bytes. */
 
+/* Begins with a null pointer for hosts that free a state through the state itself instead of through a pointer to it, as
+   fmusim does: what they free is then nothing, and they live. */
 typedef struct {
+    void *nothing;
     char guid[40];     /* of the block that it belongs to */
     uint64_t checksum; /* of a serialised state: the host may have changed its bytes */
     State state;
@@ -14,7 +17,9 @@ static uint64_t checksum(const State *state) {
     return sum;
 }
 
-static bool is_ours(const Snapshot *snapshot) { return memcmp(snapshot->guid, MODEL_GUID, sizeof MODEL_GUID) == 0; }
+static bool is_ours(const Snapshot *snapshot) {
+    return !snapshot->nothing && memcmp(snapshot->guid, MODEL_GUID, sizeof MODEL_GUID) == 0;
+}
 
 /* The snapshot that a host keeps, a new one if it has none yet; NULL with a message if there is no memory. */
 static Snapshot *room_for(Instance *c, fmi2FMUstate *kept) {

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import zipfile
 from pathlib import Path
 from typing import Any
@@ -86,6 +87,30 @@ def test_a_packed_system_has_one_parameter_set_for_each_component_that_has_value
     root = etree.fromstring(zipfile.ZipFile(tmp_path / "a.ssp").read("SystemStructure.ssd"))
     (one,) = root.iterfind(".//ssv:ParameterSet", NAMESPACES)
     assert one.get("name") == PARAMETER_SET
+
+
+def omsimulator_steps(packed: Path) -> list[str]:
+    """By its own path and prefix: it knows no namespaces."""
+    text = zipfile.ZipFile(packed).read("SystemStructure.ssd").decode()
+    (system,) = re.findall(r"<ssd:System .*</ssd:System>", text, re.DOTALL)
+    return re.findall(
+        r'<ssd:Annotations>\s*<ssc:Annotation type="org.openmodelica">\s*<oms:Annotations [^>]*>\s*'
+        r'<oms:SimulationInformation>\s*<oms:FixedStepMaster description="oms-ma" stepSize="([^"]*)"',
+        system,
+    )
+
+
+@pytest.mark.parametrize("step", ["0.25", "0.008333333333333333", "0.00001"])
+def test_a_packed_system_tells_omsimulator_its_step_once(ssd: Path, step: str) -> None:
+    """Without, its program does not load the system."""
+    packed = pack(edited(ssd, 'stepSize="0.25"', f'stepSize="{step}"'), ssd.parent / "a.ssp")
+    assert omsimulator_steps(packed) == [step]
+    assert omsimulator_steps(pack(packed, ssd.parent / "b.ssp")) == [step]
+    assert read_ssd(packed, validate=True).system.elements
+
+
+def test_a_system_without_a_step_says_nothing_to_omsimulator(ssd: Path) -> None:
+    assert omsimulator_steps(pack(edited(ssd, "imufmu:Communication", "imufmu:Other"), ssd.parent / "a.ssp")) == []
 
 
 def test_fmus_of_the_same_name_are_packed_apart(tmp_path: Path) -> None:

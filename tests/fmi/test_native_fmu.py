@@ -15,7 +15,7 @@ from fmpy.fmi1 import FMICallException
 from imufmu.fmi.model_description import LOG_CATEGORIES, guid
 from imufmu.registry import BLOCKS
 from support import fmu
-from support.fmu import ERROR, WARNING, refusal
+from support.fmu import ERROR, OK, WARNING, refusal
 from support.native_fmus import derivative, enter, leave, native, terminate
 
 NAMES = list(BLOCKS)
@@ -251,7 +251,8 @@ def test_a_state_that_was_changed_or_is_of_another_block_or_length_is_refused_an
     own = fmu.serialised(instance)
     other_build = own.replace(instance.model.guid.encode(), guid(BLOCKS["imu"], native=True).encode())
     assert own != other_build
-    changed = [own[:i] + bytes([own[i] ^ 1]) + own[i + 1 :] for i in range(40, len(own), 61)]  # behind the GUID
+    places = [0, *range(48, len(own), 61)]  # before the GUID, and behind it
+    changed = [own[:i] + bytes([own[i] ^ 1]) + own[i + 1 :] for i in places]
     for saved in (foreign, own[:-8], own + b"\0", other_build, *changed):
         message = refusal(instance, lambda saved=saved: fmu.restore(instance, saved))
         assert "was changed, or is that of another FMU" in message
@@ -268,6 +269,21 @@ def test_a_state_is_not_written_into_less_room_than_it_needs() -> None:
         instance, lambda: instance.slave.fmi2SerializeFMUstate(instance.slave.component, state, room, len(room) - 1)
     )
     assert bytes(room) == bytes(len(room))
+    instance.slave.freeFMUstate(state)
+    instance.close()
+
+
+def test_a_host_that_frees_the_state_itself_instead_of_a_pointer_to_it_lives() -> None:
+    """As fmusim does. What it frees would be the first bytes of the state, taken for an address."""
+    instance = native().initialise()
+    instance.step(0.0, 0.01)
+    state, expected = instance.slave.getFMUstate(), instance.reals()
+    assert ctypes.c_void_p.from_address(state.value).value is None  # else the next call takes this process down
+    taken_for_a_pointer = ctypes.cast(state, ctypes.POINTER(ctypes.c_void_p))
+    assert instance.slave.dll.fmi2FreeFMUstate(instance.slave.component, taken_for_a_pointer) == OK
+    instance.step(0.01, 0.01)
+    instance.slave.setFMUstate(state)  # it is still there
+    assert instance.reals() == expected
     instance.slave.freeFMUstate(state)
     instance.close()
 

@@ -58,6 +58,26 @@ def test_a_script_may_simulate_again_and_again_with_fmpy(tmp_path):
     assert done.stdout.strip() == "11", done.stderr
 
 
+def test_fmus_of_several_blocks_run_one_after_the_other_where_no_imufmu_is_installed(tmp_path: Path) -> None:
+    """Hosts delete what they unpacked. Equal edits keep the installed imufmu out of the process."""
+    folders = []
+    for name in ("imu", "lee2012", "imu"):
+        folder = Path(shutil.copytree(fmu.unpacked(name), tmp_path / f"{name}{len(folders)}"))
+        source = folder / "resources" / "imufmu" / "blocks" / "noise.py"
+        source.write_text(source.read_text() + "\n# edited\n")
+        folders.append(str(folder))
+    program = """if True:
+        import fmpy, shutil, sys
+        for folder in sys.argv[1:]:
+            print(len(fmpy.simulate_fmu(folder, stop_time=0.1, output_interval=0.01)))
+            shutil.rmtree(folder)
+        imufmu = sys.modules["imufmu"]
+        print(len(imufmu.__path__), len(imufmu.blocks.__path__))
+    """
+    done = subprocess.run([sys.executable, "-c", program, *folders], capture_output=True, text=True)
+    assert done.stdout.split() == ["11", "11", "11", "1", "1"], done.stderr
+
+
 def test_line_ends_do_not_make_another_version(tmp_path):
     runtime.copy_to(tmp_path)
     for path in (tmp_path / "imufmu").rglob("*.py"):

@@ -1,13 +1,15 @@
 """Pack a system into one .ssp file that any SSP 1.0 tool can load.
 
 The values of each component, wherever the description binds them, become one parameter set inside the description, of
-one name: libcosim applies the first set of a component only, and ecos the sets of the name that it is told.
+one name: libcosim applies the first set of a component only, and ecos the sets of the name that it is told. OMSimulator
+refuses a system that does not name a master of its own, and takes the communication step from there: that is added.
 """
 
 from __future__ import annotations
 
 import zipfile
 from collections.abc import Sequence
+from decimal import Decimal
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +23,9 @@ from .ssp.files import NAMESPACES, DescriptionError, Sources, read_bytes, read_r
 from .system import STRUCTURE, System
 
 PARAMETER_SET = "parameters"  # name of the set of each component
+
+_OMS = "https://raw.githubusercontent.com/OpenModelica/OMSimulator/master/schema/oms.xsd"  # namespace of OMSimulator
+_OMS_ANNOTATION = "org.openmodelica"
 
 _FIXED_TIME = (1980, 1, 1, 0, 0, 0)  # the earliest a zip can say: equal contents make equal bytes
 
@@ -52,6 +57,8 @@ def pack(ssd: str | Path, target: str | Path, *, native: bool = False) -> Path:
         content, path = Sources(described, None).content(dictionary, None)
         dictionary.append(read_root(content, path, "SignalDictionary", []))
         del dictionary.attrib["source"]
+    if system.description.step is not None:
+        _name_master(root.find("ssd:System", NAMESPACES), system.description.step)
     etree.indent(root)
     contents = {name: path.read_bytes() for name, path in members.items()}
     contents[STRUCTURE] = etree.tostring(root, xml_declaration=True, encoding="UTF-8")
@@ -68,6 +75,22 @@ def _full_name(component: Any) -> str:
     """Name of a component with those of the systems around it, without that of the whole."""
     around = [system.get("name") for system in component.iterancestors(f"{{{NAMESPACES['ssd']}}}System")]
     return ".".join([*reversed(around[:-1]), component.get("name")])
+
+
+def _name_master(system: Any, step: float) -> None:
+    """Tell OMSimulator of the step (s), unless the system tells it something already."""
+    ssd, ssc, oms = f"{{{NAMESPACES['ssd']}}}", f"{{{NAMESPACES['ssc']}}}", f"{{{_OMS}}}"
+    annotations = system.find("ssd:Annotations", NAMESPACES)
+    if annotations is None:
+        annotations = etree.SubElement(system, f"{ssd}Annotations")  # the last of its children
+    if annotations.find(f"ssc:Annotation[@type='{_OMS_ANNOTATION}']", NAMESPACES) is not None:
+        return
+    annotation = etree.SubElement(annotations, f"{ssc}Annotation", type=_OMS_ANNOTATION)
+    own = etree.SubElement(annotation, f"{oms}Annotations", nsmap={"oms": _OMS})  # it reads the prefix only
+    master = etree.SubElement(etree.SubElement(own, f"{oms}SimulationInformation"), f"{oms}FixedStepMaster")
+    size = f"{Decimal(repr(step)):f}"  # all digits, without an exponent
+    for name, value in {"description": "oms-ma", "stepSize": size, "relativeTolerance": "0.0001"}.items():
+        master.set(name, value)
 
 
 def _bindings(settings: Sequence[Setting]) -> Any:

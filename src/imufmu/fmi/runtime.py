@@ -56,11 +56,26 @@ def rejoin_installed() -> None:
     for entry in sys.path:
         installed = Path(entry) / "imufmu"
         if (installed / "cosim").is_dir() and fingerprint(installed) == IN_MEMORY:
-            for name, module in list(sys.modules.items()):
-                folder = str(installed.joinpath(*name.split(".")[1:]))
-                if name.split(".")[0] == "imufmu" and folder not in getattr(module, "__path__", [folder]):
-                    module.__path__.append(folder)
+            _find_also_in(installed)
             return
+
+
+def go_on_with(copy: Path) -> None:
+    """Where the package in memory has lost its folder, find what is not loaded yet in this copy of equal source.
+
+    Otherwise an FMU of another block could not start once the host has deleted what it unpacked of the first.
+    """
+    if not PACKAGE.is_dir():
+        _find_also_in(copy)
+
+
+def _find_also_in(copy: Path) -> None:
+    """Add the folders of a copy to those where the packages in memory look for modules; drop what is gone."""
+    for name, module in list(sys.modules.items()):
+        path = getattr(module, "__path__", None)
+        if name.split(".")[0] == "imufmu" and path is not None:
+            folder = str(copy.joinpath(*name.split(".")[1:]))
+            path[:] = [*(entry for entry in path if entry != folder and Path(entry).is_dir()), folder]
 
 
 def refusal(resources: Path) -> str:

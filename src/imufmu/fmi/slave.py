@@ -21,7 +21,7 @@ from pythonfmu import Fmi2Slave
 from pythonfmu.enums import Fmi2Status
 
 from . import saved_state
-from .runtime import refusal, rejoin_installed
+from .runtime import go_on_with, refusal, rejoin_installed
 from .wrapper import Log, hold, let_go_at_the_end
 
 
@@ -65,6 +65,7 @@ class BlockSlave(Fmi2Slave):
         reason = refusal(resources)
         if reason:
             raise Refused(f"{self.modelName}: {reason}")
+        go_on_with(resources / "imufmu")
         try:
             module, name = self.where.split(":")
             self.block = getattr(importlib.import_module(module), name)
