@@ -77,7 +77,6 @@ def test_a_limits_file_beside_the_system_is_found_and_names_its_system(imufmu: C
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        (["pendulum_lee2012"], "no limits: there is no pendulum_lee2012.limits.toml beside it"),
         (["pendulum_lee"], "no system is called 'pendulum_lee'"),
         (["pendulum_lee2012", "--require", "plumb.tlt.max < 2 deg", *SHORT], "did you mean plumb.tilt?"),
         (["pendulum_lee2012", "--require", "plumb.tilt.max < 2", *SHORT], "needs a unit"),
@@ -89,6 +88,12 @@ def test_wrong_input_is_exit_code_2_and_one_line(arguments: list[str], said: str
     assert code == 2
     assert said in " ".join(err.split())
     assert "Traceback" not in err
+
+
+def test_a_system_without_limits_is_no_verdict(imufmu: Command, tmp_path: Path) -> None:
+    code, _, err = imufmu("check", rogue_system(tmp_path))
+    assert code == 2
+    assert "no limits: there is no rogues.limits.toml beside it" in " ".join(err.split())
 
 
 def test_a_run_that_fails_breaks_the_limit_and_says_why(imufmu: Command, tmp_path: Path) -> None:
