@@ -242,7 +242,7 @@ def test_json_has_everything_and_null_for_what_is_not_finite(imufmu):
     assert good["tables"][0]["rows"] == [["A", "1.9", "1.8"]]
     assert good["remarks"] == ["Test C improves with <eps> there, not here."]
     expected = dict(name="ratio is large", value=12.0, limit=4.0, at_most=False, unit="1", margin=2.0, passed=True)
-    assert good["checks"][1] == expected | {"reason": "every seed had 6 & more"}
+    assert good["checks"][1] == expected | {"reason": "every seed had 6 & more", "where": ""}
     assert bad["checks"][2]["value"] is None and bad["checks"][2]["passed"] is False
     assert "ArithmeticError" in broken["error"]
 

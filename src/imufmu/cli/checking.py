@@ -16,7 +16,10 @@ from .runs import InProcess, Native, Sets, StepTimeout
 def check(
     system: Annotated[str, typer.Argument(help="Name of a system, an .ssd or .ssp file, or a .limits.toml file")],
     limits: Annotated[
-        Path | None, typer.Option("--limits", help="Limits file; without it NAME.limits.toml beside NAME.ssd.")
+        Path | None,
+        typer.Option(
+            "--limits", help="Limits file; without it, and without --require, NAME.limits.toml beside NAME.ssd."
+        ),
     ] = None,
     require: Annotated[
         list[str] | None,

@@ -16,16 +16,16 @@ def requested(
 ) -> tuple[Plan, list[Limit], int | None]:
     """Plan, limits and number of seeds (None for one run as the system is).
 
-    target: a system by name or file, or a limits file. limits: a limits file; without one, that beside the system is
-    taken where there is one. options: of a Plan; they go before what the limits file says. Raises LimitsError, OSError,
-    and ValueError for a system that does not exist.
+    target: a system by name or file, or a limits file. limits: a limits file; without one, and with nothing required,
+    that beside the system is taken. options: of a Plan; they go before what the limits file says. Raises LimitsError,
+    OSError, and ValueError for a system that does not exist.
     """
     if target.endswith(SUFFIX):
         if limits is not None:
             raise LimitsError(f"{target} is a limits file already; give its system, or leave --limits out")
         limits, target = Path(target), ""
     given = [required(text) for text in require]
-    beside = None if limits or not target else _beside(target)
+    beside = None if limits or given or not target else _beside(target)
     read = read_limits(limits or beside) if limits or beside else Limits(())  # type: ignore[arg-type]
     asked = [*read.limits, *given]
     if not asked:
