@@ -8,6 +8,7 @@ from pathlib import Path
 # From top to bottom; each imports only from rooms below it.
 ROOMS = (
     ("cli", "the verbs of the command line"),
+    ("gate", "limits that must hold, over seeds"),
     ("benchmarks", "filters side by side, cost of a sample"),
     ("papers", "the papers' experiments and verdicts"),
     ("reports", "tables and pages for people"),
@@ -33,7 +34,7 @@ WAY = (
     ("estimators", "vertical", "predict by the gyroscope, correct by the accelerometer"),
     ("cosim", "Result", "the row of t_k holds truth, reading and estimate"),
     ("scoring", "tilt_rmse_deg", "angle to the plant's vertical, at equal sample_time"),
-    ("papers", "verdict", "value against limit: exit code, report, JUnit"),
+    ("gate", "verdict", "value against limit: exit code, page, JUnit"),
 )
 
 WIDTH, ROW, TOP, GAP = 1000, 40, 74, 8

@@ -16,6 +16,7 @@ SOURCE = ROOT / "src"
 # From top to bottom; the rooms of one line do not see each other.
 ORDER = (
     ("cli",),
+    ("gate",),
     ("benchmarks",),
     ("papers",),
     ("reports",),

@@ -18,9 +18,10 @@ from imufmu.cli import console
 from imufmu.cli.arguments import parsed_sets
 from imufmu.cli.main import main
 from imufmu.papers import validate as gate
-from imufmu.papers.experiment import Check, Outcome
+from imufmu.papers.experiment import Outcome
 from imufmu.papers.validate import Verdict
 from imufmu.registry import BLOCKS
+from imufmu.scoring.checks import Check
 from imufmu.scoring.table import Table
 
 Command = Callable[..., tuple[int, str, str]]

@@ -17,11 +17,11 @@ from imufmu.files.atomic import WriteError
 from imufmu.files.cache import cached
 from imufmu.files.csv_table import write_csv
 from imufmu.fmi.build import build_fmu
-from imufmu.papers.junit import write_junit
 from imufmu.papers.validate import Verdict
 from imufmu.papers.verdicts import write_json, write_page
 from imufmu.pictures.figures import save
 from imufmu.pictures.movies import write_movie
+from imufmu.reports.junit import write_junit
 from support.optional import needs
 
 pytestmark = needs("POSIX")  # a limit of the size of files stands for a full disk
@@ -55,7 +55,7 @@ def figure() -> Figure:
 WRITERS: dict[str, Callable[[Path], object]] = {
     "a.csv": lambda path: write_csv(path, COLUMNS),
     "a.h5": RESULT.to_hdf5,
-    "a.xml": lambda path: write_junit(path, VERDICTS),
+    "a.xml": lambda path: write_junit(path, "validate", [v.suite() for v in VERDICTS]),
     "a.json": lambda path: write_json(path, VERDICTS, False),
     "a.html": lambda path: write_page(path, VERDICTS, False),
     "a.png": lambda path: save(figure(), path),

@@ -18,16 +18,17 @@ import pytest
 
 from imufmu.cli import main as cli
 from imufmu.papers import validate as gate
-from imufmu.papers.experiment import Check
-from imufmu.papers.junit import write_junit
 from imufmu.papers.validate import PAPERS, Verdict, validate
 from imufmu.papers.verdicts import failure_table, verdict_table, write_json, write_page
+from imufmu.reports.junit import write_junit
+from imufmu.scoring.checks import Check
 from support.optional import needs
 
 GOOD = """
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter
-from imufmu.papers.experiment import Check, Experiment, Outcome
+from imufmu.papers.experiment import Experiment, Outcome
+from imufmu.scoring.checks import Check
 from imufmu.reports.page import Section
 from imufmu.scoring.table import Table
 
@@ -47,7 +48,8 @@ EXPERIMENT = Experiment("good", "A good paper", "A. Uthor 2012", run)
 """
 BAD = """
 import numpy as np
-from imufmu.papers.experiment import Check, Experiment, Outcome
+from imufmu.papers.experiment import Experiment, Outcome
+from imufmu.scoring.checks import Check
 
 def run(quick, progress):
     checks = [Check("holds", np.float64(1.0), 2.0),
@@ -240,7 +242,7 @@ def test_json_has_everything_and_null_for_what_is_not_finite(imufmu):
     assert good["tables"][0]["rows"] == [["A", "1.9", "1.8"]]
     assert good["remarks"] == ["Test C improves with <eps> there, not here."]
     expected = dict(name="ratio is large", value=12.0, limit=4.0, at_most=False, unit="1", margin=2.0, passed=True)
-    assert good["checks"][1] == expected | {"reason": "every seed had 6 & more"}
+    assert good["checks"][1] == expected | {"reason": "every seed had 6 & more", "where": ""}
     assert bad["checks"][2]["value"] is None and bad["checks"][2]["passed"] is False
     assert "ArithmeticError" in broken["error"]
 
@@ -283,7 +285,7 @@ def test_a_paper_passes_its_quick_run_and_can_be_told_in_every_form(paper, tmp_p
         assert any(section.figure for section in verdict.outcome.sections)
         assert any(section.table for section in verdict.outcome.sections)
     write_page(tmp_path / "v.html", found, quick=True)
-    write_junit(tmp_path / "v.xml", found)
+    write_junit(tmp_path / "v.xml", "validate", [verdict.suite() for verdict in found])
     write_json(tmp_path / "v.json", found, quick=True)
     count = sum(len(verdict.checks) for verdict in found)
     assert ElementTree.parse(tmp_path / "v.xml").getroot().get("tests") == str(count)

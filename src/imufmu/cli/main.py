@@ -13,6 +13,7 @@ import typer
 from .. import __version__
 from ..cosim.errors import SimulationError
 from ..cosim.interrupt import clean_up_when_asked_to_end
+from .checking import check
 from .connecting import connect
 from .console import err, out, show_what_can_be_shown
 from .fmus import build, doctor, info
@@ -38,6 +39,7 @@ EXAMPLES = """IMU attitude estimators as drop-in FMUs, with the plants and IMU m
   imufmu replay walk.csv --estimator lee2012 --set c_a=0.2 --output tilt.csv
   imufmu inspect log.txt                        what is in a recording, its rate, gaps, units and axes
   imufmu pack pendulum_lee2012 pendulum.ssp     for other tools
+  imufmu check pendulum_lee2012 --require "plumb.tilt.max < 2 deg"
   imufmu validate --junit verdict.xml           do the papers' conclusions hold?
   imufmu benchmark broad                        every filter on a folder of recordings
   imufmu speed                                  what a sample costs, native and in Python
@@ -64,7 +66,8 @@ def _root(version: Annotated[bool, typer.Option("--version", help="Print the ver
 
 
 app.command("list")(list_)
-for verb in (build, doctor, info, connect, run, replay, inspect, pack, demo, validate, benchmark, speed, predict):
+VERBS = (build, doctor, info, connect, run, replay, inspect, pack, demo, check, validate, benchmark, speed, predict)
+for verb in VERBS:
     app.command()(verb)
 
 

@@ -35,9 +35,9 @@ def validate(
       imufmu validate lee2012 rizun2008 --quick
       imufmu validate --report verdict.html --junit verdict.xml --json verdict.json
     """
-    from ..papers.junit import write_junit
     from ..papers.validate import validate as run_experiments
     from ..papers.verdicts import failure_table, verdict_table, write_json, write_page
+    from ..reports.junit import write_junit
 
     check_target(report, ".html")
     check_target(junit, ".xml")
@@ -52,7 +52,7 @@ def validate(
         if json:
             write_json(json, verdicts, quick)
         if junit:
-            write_junit(junit, verdicts)
+            write_junit(junit, "validate", [verdict.suite() for verdict in verdicts])
         if report:
             write_page(report, verdicts, quick)
     finally:

@@ -9,18 +9,19 @@ import os
 import signal
 import time
 import traceback
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
-from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from importlib import import_module
-from multiprocessing import active_children, get_context
+from multiprocessing import get_context
 from typing import Any
 
 from ..files.names import no_such
+from ..files.workers import no_ctrl_c_for_what_starts_here, workers_end_with_us
 from ..pictures.figures import png
 from ..reports.page import Section
-from .experiment import Check, Experiment, Outcome, Progress
+from ..scoring.checks import Check, Suite
+from .experiment import Experiment, Outcome, Progress
 
 PAPERS: Mapping[str, str] = {
     "lee2012": "imufmu.papers.lee2012.experiment",
@@ -64,6 +65,10 @@ class Verdict:
     def remarks(self) -> Sequence[str]:
         return self.outcome.remarks if self.outcome else ()
 
+    def suite(self) -> Suite:
+        """As every verdict is written."""
+        return Suite(self.name, self.checks, self.seconds, self.remarks, self.error)
+
 
 def validate(
     names: Sequence[str] = (),
@@ -87,8 +92,8 @@ def validate(
     context = get_context("spawn")  # as on Windows and macOS; a fork could copy a lock that another thread holds
     shares = context.Array("d", len(chosen))
     pool = ProcessPoolExecutor(min(len(chosen), os.cpu_count() or 1), context, _prepare_worker, (shares,))
-    with pool, _workers_end_with_us():
-        with _no_ctrl_c_for_what_starts_here():
+    with pool, workers_end_with_us():
+        with no_ctrl_c_for_what_starts_here():
             runs = [pool.submit(_run, place, name, papers[name], quick, drawn) for place, name in enumerate(chosen)]
         pending = set(runs)
         while pending:
@@ -106,31 +111,6 @@ def _verdict(name: str, run: Future[Verdict]) -> Verdict:
     """The result of a run; a process that died leaves none."""
     error = run.exception()
     return Verdict(name, name, "", 0.0, None, f"{type(error).__name__}: {error}") if error else run.result()
-
-
-@contextmanager
-def _workers_end_with_us() -> Iterator[None]:
-    """After Ctrl-C or any other exception the experiments that still run are of no use to anyone."""
-    others = set(active_children())
-    try:
-        yield
-    except BaseException:
-        for worker in set(active_children()) - others:
-            worker.terminate()
-        raise
-
-
-@contextmanager
-def _no_ctrl_c_for_what_starts_here() -> Iterator[None]:
-    """Ctrl-C reaches the whole process group, but we end the workers ourselves; it waits for us until we are back."""
-    if not hasattr(signal, "pthread_sigmask"):  # Windows: a worker that is still starting may show a trace
-        yield
-        return
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _prepare_worker(shares: Any) -> None:

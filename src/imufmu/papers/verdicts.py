@@ -12,8 +12,8 @@ from typing import Any
 from .. import __version__
 from ..files.atomic import atomic_write
 from ..reports.page import Section, write_report
+from ..scoring.checks import Check, limit_text, value_text
 from ..scoring.table import Table
-from .experiment import Check
 from .validate import Verdict
 
 _LEAD = (
@@ -47,16 +47,6 @@ def failure_table(verdicts: Sequence[Verdict]) -> Table | None:
     return (
         Table(["paper", "criterion not met", "value", "limit", "margin", "reason"], rows, words=True) if rows else None
     )
-
-
-def value_text(check: Check) -> str:
-    """The value with its unit."""
-    return _quantity(check.value, check.unit)
-
-
-def limit_text(check: Check) -> str:
-    """The limit with its sense and unit."""
-    return f"{'≤' if check.at_most else '≥'} {_quantity(check.limit, check.unit)}"
 
 
 def write_page(path: Path, verdicts: Sequence[Verdict], quick: bool) -> None:
@@ -129,10 +119,6 @@ def _finite(value: Any) -> Any:
     if isinstance(value, str | bool):
         return value
     return float(value) if math.isfinite(value) else None
-
-
-def _quantity(value: float, unit: str) -> str:
-    return f"{value:.4g}" + (f" {unit}" if unit != "1" else "")
 
 
 def _margin(check: Check) -> float:

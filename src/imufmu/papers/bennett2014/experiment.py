@@ -12,8 +12,9 @@ from matplotlib.figure import Figure
 from ...estimators.bennett2014 import BLOCK, CORRECTED, GYRO_ONLY, RAW
 from ...pictures.figures import COLOURS, TRUTH_COLOUR
 from ...reports.page import Section
+from ...scoring.checks import Check
 from ...scoring.table import Table
-from ..experiment import Check, Experiment, Outcome, Progress
+from ..experiment import Experiment, Outcome, Progress
 from .trials import Trial, estimated, slow, trial, varied
 
 SEEDS = {True: 4, False: 16}  # trials of each kind, quick and full

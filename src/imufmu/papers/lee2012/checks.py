@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..experiment import Check, at_least, at_most
+from ...scoring.checks import Check, at_least, at_most
 from .runs import C_A, DURATION, EARLY, LATE, MODES, RESTED, THRESHOLDS, VERY_LATE, G, Seed, tilts
 
 _MARGIN = "on other motions of these statistics it holds with a margin of 1.5 at least"

@@ -8,8 +8,9 @@ from itertools import pairwise, product
 import numpy as np
 
 from ...reports.page import Section
+from ...scoring.checks import Check
 from ...scoring.table import Table
-from ..experiment import Check, Experiment, Outcome, Progress
+from ..experiment import Experiment, Outcome, Progress
 from . import cost, figures
 from .runs import (
     FILTERS,

@@ -10,8 +10,9 @@ from ...blocks.vocabulary import GRAVITY
 from ...estimators import rizun2008
 from ...reports.page import Section
 from ...scoring import prediction
+from ...scoring.checks import Check
 from ...scoring.table import Table
-from ..experiment import Check, Experiment, Outcome, Progress
+from ..experiment import Experiment, Outcome, Progress
 from . import figures, runs
 from .runs import (
     ASSUMED,

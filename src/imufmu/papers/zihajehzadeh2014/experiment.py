@@ -16,9 +16,10 @@ from matplotlib.figure import Figure
 from ...blocks.running import Trajectory
 from ...pictures.figures import COLOURS, TRUTH_COLOUR
 from ...reports.page import Section
+from ...scoring.checks import Check
 from ...scoring.metrics import rms
 from ...scoring.table import Table
-from ..experiment import Check, Experiment, Outcome, Progress
+from ..experiment import Experiment, Outcome, Progress
 from .magnetic import (
     directions,
     disturb,

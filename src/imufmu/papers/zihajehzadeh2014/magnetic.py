@@ -14,9 +14,9 @@ from matplotlib.figure import Figure
 
 from ...pictures.figures import COLOURS, TRUTH_COLOUR
 from ...reports.page import Section
+from ...scoring.checks import Check
 from ...scoring.metrics import angle_difference
 from ...scoring.table import Table
-from ..experiment import Check
 from .motions import NORM, RAMP, SPANS, at_rest
 from .runs import NO_TEST, PERIOD, STRICT, errors, filtered, read, yaw_error
 

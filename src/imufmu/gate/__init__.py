@@ -1,0 +1,1 @@
+"""Limits that a system or a recording must hold, and the verdict."""
