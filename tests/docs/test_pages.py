@@ -82,9 +82,9 @@ def rocking(seed: int) -> dict[str, np.ndarray]:
 def readers_folder(folder: Path) -> None:
     """What a reader has at hand: a recording of a walk, and a folder of recordings."""
     write_csv(folder / "walk.csv", rocking(1))
-    (folder / "broad").mkdir()
-    for seed in (2, 3):
-        write_csv(folder / "broad" / f"trial_{seed}.csv", rocking(seed))
+    for seed, kind in ((2, "broad"), (3, "broad"), (4, "field/phone"), (5, "field/robot")):
+        (folder / kind).mkdir(parents=True, exist_ok=True)
+        write_csv(folder / kind / f"trial_{seed}.csv", rocking(seed))
 
 
 def follow(page: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], slowly: bool) -> None:

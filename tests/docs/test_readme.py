@@ -37,20 +37,23 @@ def test_readme_has_one_figure_two_commands_one_table_of_results_and_fits_three_
 
 
 def test_results_of_the_readme_are_those_of_the_pages():
-    """Columns: BROAD with the parameters for real recordings, truth delayed; then three systems."""
+    """Columns: BROAD and cars with the parameters for real recordings, truth delayed; then three systems."""
     of_readme, broad, cars = (table_rows(text) for text in (README, PAGES["recordings"], PAGES["vehicles"]))
     estimators = next(cells for name, cells in cars.items() if name == "system")
     here = [name.replace(", ours", "").replace(", of others", "") for name in of_readme]
     rows = dict(zip(here, of_readme.values(), strict=True))
-    for name in ("lee2012", "leechoi2018", "rizun2008", "plumb", "VQF"):
+    for name in ("lee2012", "leechoi2018", "rizun2008", "plumb", "VQF", "RIANN"):
         cells = next(cells for label, cells in rows.items() if label.replace("`", "") == name)
-        assert cells[0] == broad[name][-1], name
-    systems = [name.strip("`") for name in of_readme["estimator"][1:]]
+        assert cells[0] == broad[name][-1] == broad["broad (14)"][broad["kind"].index(name)], name
+        assert cells[1] == broad["car (22)"][broad["kind"].index(name)], name
+    on_wheels = next(cells for label, cells in rows.items() if label.endswith("the speed of the wheels"))
+    assert f"`plumb` has {on_wheels[1]} deg in" in PAGES["recordings"]
+    systems = [name.strip("`") for name in of_readme["estimator"][2:]]
     for label, cells in rows.items():
         name = label.replace("`", "")
         column = {"plumb": "plumb without wheels", "plumb with the speed of the wheels": "plumb"}.get(name, name)
         if column in estimators:
-            assert cells[1:] == [cars[system][estimators.index(column)] for system in systems], name
+            assert cells[2:] == [cars[system][estimators.index(column)] for system in systems], name
 
 
 @pytest.mark.long
