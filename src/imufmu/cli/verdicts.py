@@ -131,7 +131,8 @@ def benchmark(
     check_target(csv, ".csv", inputs=inputs)
     check_target(json, ".json", inputs=inputs)
     begin = partial(score, delay=delay, rest=rest_bias, starts=starts, group=group, offline=offline)
-    with progress_bar(f"scoring {', '.join(places)}") as progress:
+    more = f" and {len(places) - 1} more" if len(places) > 1 else ""
+    with progress_bar(f"scoring {places[0]}{more}") as progress:
         result = begin(places, estimators or (), without=without or (), settings=parsed_sets(sets), progress=progress)
     if csv:
         write_scores(csv, result)
