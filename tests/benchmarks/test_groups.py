@@ -31,7 +31,7 @@ def data(tmp_path: Path) -> Path:
     for name, tilt in (("walk/slow_1", 0.01), ("walk/fast_1", 0.02), ("ride/day/slow_2", 0.06)):
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         write_csv(tmp_path / f"{name}.csv", level(tilt))
-    (tmp_path / "walk" / "notes.txt").write_text("no recording")
+    (tmp_path / "walk" / "notes.md").write_text("no recording")
     return tmp_path
 
 

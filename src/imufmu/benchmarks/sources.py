@@ -15,7 +15,8 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
-from ..recordings.reading import KINDS
+from ..recordings.folders import is_recording_folder
+from ..recordings.reading import is_recording
 
 GROUPS_FILE = "trials.json"
 Place = str | PathLike[str]
@@ -81,7 +82,7 @@ def _paths(place: Place) -> list[Path]:
     """Every recording of one place, sorted."""
     path = Path(place)
     if path.is_dir():
-        return sorted(p for p in path.rglob("*") if p.suffix.lower() in KINDS and p.is_file())
+        return _within(path)
     if path.exists():
         return [path]
     if not has_magic(str(place)):
@@ -89,8 +90,19 @@ def _paths(place: Place) -> list[Path]:
     found = [Path(name) for name in sorted(glob(str(place), recursive=True))]
     if not found:
         raise ValueError(f"{place}: no file and no folder fits this pattern")
-    every = (_paths(p) if p.is_dir() else [p] * (p.suffix.lower() in KINDS) for p in found)
+    every = (_within(p) if p.is_dir() else [p] * is_recording(p) for p in found)
     return [p for some in every for p in some]
+
+
+def _within(folder: Path) -> list[Path]:
+    """The recordings in a folder and below, sorted; itself, where it is one."""
+    if is_recording_folder(folder) or is_recording(folder):
+        return [folder]
+    try:
+        parts = sorted(folder.iterdir())
+    except OSError as error:
+        raise ValueError(f"{folder}: cannot list the folder: {error.strerror}") from None
+    return [p for part in parts for p in (_within(part) if part.is_dir() else [part] * is_recording(part))]
 
 
 def _by_folder(paths: Sequence[Path]) -> dict[Path, str]:

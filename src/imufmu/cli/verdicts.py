@@ -76,7 +76,7 @@ def _tell_of_one(verdict: Verdict) -> None:
 def benchmark(
     places: Annotated[
         list[str],
-        typer.Argument(metavar="PLACE...", help="Folders, files or patterns: .csv that know the truth, .mat of BROAD"),
+        typer.Argument(metavar="PLACE...", help="Folders, recordings or patterns, that know the truth"),
     ],
     estimators: Annotated[
         list[str] | None, typer.Option("--estimator", "-e", help="Name of an estimator; all without. Repeatable.")
@@ -120,8 +120,8 @@ def benchmark(
       imufmu benchmark walks --group "(stairs|street)"
 
     Twice: with the parameters of the papers, then with parameters for real recordings, which all that follows is about:
-    the ratio to VQF, the worst recordings, how honest tilt_std is, starts inside a motion, the heading. For the columns
-    of a .csv file see imufmu replay --help.
+    the ratio to VQF, the worst recordings, how honest tilt_std is, starts inside a motion, the heading. Of what can
+    be a recording see imufmu inspect --help.
     """
     from ..benchmarks.recordings import benchmark as score
     from ..benchmarks.sources import sources
