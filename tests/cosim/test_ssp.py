@@ -349,8 +349,12 @@ def test_other_prefixes_are_as_good_and_an_undeclared_one_is_noted(tmp_path: Pat
     assert System.read(path, strict=True).links
     path.write_text(text.replace(f'xmlns:ssd="{NAMESPACES["ssd"]}"', ""))
     assert noted(path, "the prefix ssd is not declared (xmlns)").links
-    path.write_text(text.replace(NAMESPACES["ssd"], "http://example.invalid/SystemStructureDescription"))
+    path.write_text(text.replace(NAMESPACES["ssd"], "http://example.invalid/ssd"))
     assert noted(path, "the namespace of SystemStructureDescription is not").links
+    path.write_text(text.replace("http://ssp-standard.org/SSP1/SystemStructure", "urn:draft:SystemStructure"))
+    assert noted(path, "the namespace of Annotation is not").links
+    path.write_text(text.replace("</ssd:Connections>", "</ssd:Connections><oms:Hint/>"))
+    assert noted(path, "the prefix oms is not declared (xmlns)").links
 
 
 def test_what_breaks_the_schema_and_is_clear_runs_with_a_note(tmp_path: Path) -> None:

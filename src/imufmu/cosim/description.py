@@ -177,7 +177,7 @@ def _system_of(root: Any, path: Path) -> Any:
 def _step(root: Any, path: Path) -> float | None:
     """The step size of an annotation, ours first."""
     for kind, name, attribute in _STEPS:
-        for found in root.iterfind(f".//ssc:Annotation[@type='{kind}']//{{*}}{name}", NAMESPACES):
+        for found in root.iterfind(f".//{{*}}Annotation[@type='{kind}']//{{*}}{name}"):
             return number(found, attribute, path)
     return None
 

@@ -14,6 +14,7 @@ from .units import UnitError
 # Causalities of variables that can feed, and that can be fed. A local variable is no output, but can be read as one.
 _FROM = ("output", "calculatedParameter", "local")
 _TO = ("input", "parameter", "structuralParameter")
+_SPOKEN_AS = {"structuralParameter": "parameter", "local": "output"}  # kinds of SSP 2.0, in the words of 1.0
 _TOLD = 3  # connections told by name in one note
 
 
@@ -59,7 +60,7 @@ def _connector_faults(component: Component, interface: Interface) -> list[str]:
         if variable is None:
             faults.append(f"{where}: the FMU has no such variable. Near: {near(name, interface.variables)}")
             continue
-        if connector.kind != variable.causality:
+        if connector.kind not in (variable.causality, _SPOKEN_AS.get(variable.causality)):
             faults.append(f"{where}: declared as {connector.kind}; the FMU says {variable.causality}")
         if connector.type is not None and connector.type != variable.type:
             faults.append(f"{where}: declared as {connector.type}; the FMU says {variable.type}")
@@ -173,9 +174,9 @@ class _Checks:
             if are_real and same_units and (units[0] is None) != (units[1] is None):
                 names = " -> ".join(label(*end) for end in ends)
                 pairs.setdefault((way[0][0], way[-1][0]), []).append(names)
-        for links in pairs.values():
-            more = f" and {len(links) - _TOLD} more" if len(links) > _TOLD else ""
-            told = ", ".join(links[:_TOLD])
+        for wires in pairs.values():
+            more = f" and {len(wires) - _TOLD} more" if len(wires) > _TOLD else ""
+            told = ", ".join(wires[:_TOLD])
             self.notes.append(f"{told}{more}: one end does not name its unit; taken for the same")
 
     def note_shifted_index(self, way: Sequence[Node]) -> None:

@@ -34,7 +34,7 @@ def connector_of(element: Any, kind: str | None, files: Sources, units: Mapping[
     unit = None if declared is None else declared.get("unit")
     return Connector(
         kind,
-        None if declared is None else etree.QName(declared).localname,
+        element.get("type") if declared is None else etree.QName(declared).localname,  # some write an attribute
         None if not unit else units.get(unit, Unit(unit)),
         files.where(element),
     )

@@ -132,10 +132,7 @@ def read_root(content: bytes, path: Path, name: str, faults: list[str]) -> Any:
 
 def check_root(root: Any, path: Path, name: str, faults: list[str]) -> None:
     """Bring an element, which may stand in another file, to the names of SSP 1.0, and note what is wrong with it."""
-    namespace = NAMESPACES[_ROOTS[name]]
-    if etree.QName(root).namespace != namespace:
-        faults.append(f"{path}, line {root.sourceline}: the namespace of {name} is not {namespace}")
-        _rename(root, etree.QName(root).namespace, namespace)
+    _rename(root, path, NAMESPACES[_ROOTS[name]], faults)
     lower(root, path, faults)
     rules = _schema(_SCHEMAS[name])
     if not rules.validate(root):
@@ -167,22 +164,31 @@ def _parsed(content: bytes, path: Path, faults: list[str]) -> Any:
         parser = etree.XMLParser(resolve_entities=False, no_network=True, recover=True)
         root = etree.fromstring(content, parser)
         missing = [re.fullmatch(r"Namespace prefix (\w+) .*not defined", entry.message) for entry in parser.error_log]
-        if root is None or not all(match and match[1] in NAMESPACES for match in missing):
+        if root is None or not all(missing):
             raise
         prefixes = sorted({match[1] for match in missing if match})
         faults.append(f"{path}: the prefix {', '.join(prefixes)} is not declared (xmlns)")
         for element in root.iter(etree.Element):
             prefix, colon, name = element.tag.partition(":")
             if colon and prefix in prefixes:
-                element.tag = f"{{{NAMESPACES[prefix]}}}{name}"
+                element.tag = f"{{{NAMESPACES.get(prefix, prefix)}}}{name}"
         return root
 
 
-def _rename(root: Any, old: str | None, new: str) -> None:
-    """Put the elements of one namespace into another."""
+def _rename(root: Any, path: Path, own: str, faults: list[str]) -> None:
+    """Put the elements of drafts of SSP, and those around a root without its namespace, into those of the standard."""
+    new = {etree.QName(root).namespace: own}
     for element in root.iter(etree.Element):
-        if etree.QName(element).namespace == old:
-            element.tag = f"{{{new}}}{etree.QName(element).localname}"
+        name = etree.QName(element)
+        draft = re.search(
+            r"SystemStructure(Description|Common|Parameter(Values|Mapping)|SignalDictionary)", name.namespace or ""
+        )
+        wanted = new.get(name.namespace) or (f"{SSP}{draft[0]}" if draft else name.namespace)
+        if name.namespace != wanted:
+            if name.namespace not in new or element is root:
+                faults.append(f"{path}, line {element.sourceline}: the namespace of {name.localname} is not {wanted}")
+            new[name.namespace] = wanted
+            element.tag = f"{{{wanted}}}{name.localname}"
 
 
 @lru_cache
