@@ -66,6 +66,14 @@ def test_the_unit_and_a_constant_offset_of_the_accelerometer_do_not_matter():
     assert said(GYRO, -ACCEL) == ""  # which cannot be seen
 
 
+def test_a_body_that_is_shaken_is_told_from_a_flipped_axis():
+    """Two metres per second squared to and fro, three times a second, beside the turning."""
+    shaken = ACCEL + 2 * np.sin(2 * np.pi * 3 * MOTION["time"])[:, None] * [1, 0.7, 0.4]
+    assert said(GYRO, shaken) == ""
+    assert "left-handed" in said(-GYRO, shaken)
+    assert "axis x of gyro is flipped" in said(GYRO * [-1, 1, 1], shaken)
+
+
 def test_at_rest_nothing_can_be_told():
     rng = np.random.default_rng(1)
     still = rng.normal((0, 0, 9.81), 0.02, (2000, 3))
