@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..blocks.vocabulary import GRAVITY
-from .checks import axes_doubts, turning_of
+from .checks import axes_doubts, field_turning_of, turning_of
 from .faults import RecordingError
 from .reading import TEXTS, Recording, read, recordings_in
 from .text_table import read_table
@@ -170,10 +170,13 @@ def _start(recording: Recording) -> str:
 
 def _axes(recording: Recording, doubtful: list[str]) -> str:
     if doubtful:
-        return "gyro and accel do not fit together"
-    if turning_of(recording).seen:
-        return "gyro and accel fit together: gravity turns as the gyroscope says"
-    return "too little turning, or too much motion, to tell whether gyro and accel fit together"
+        return "gyro and accel, or mag, do not fit together"
+    fits = [
+        name for name, of in (("gravity", turning_of), ("the magnetic field", field_turning_of)) if of(recording).seen
+    ]
+    if fits:
+        return f"fit together: {' and '.join(fits)} turn{'s' * (len(fits) == 1)} as the gyroscope says"
+    return "too little turning, or too much motion, to tell whether they fit together"
 
 
 def _clipping(recording: Recording) -> list[str]:
