@@ -86,7 +86,7 @@ def overview(
                     "seconds": float(recording.time[-1] - recording.time[0]),
                     "missing": missing,
                     "signals": [*recording.readings, *recording.truth],
-                    "fits": not axes_doubts(recording) if turning_of(recording).seen else None,
+                    "fits": _fits(recording),
                 }
             )
         if progress:
@@ -94,6 +94,13 @@ def overview(
     if not facts:
         raise RecordingError(f"{folder}: no recording in it" + (f"; {faults[0]}" if faults else ""))
     return facts, faults
+
+
+def _fits(recording: Recording) -> bool | None:
+    """Whether the axes fit together; None where nothing tells."""
+    if axes_doubts(recording):
+        return False
+    return True if turning_of(recording).seen or field_turning_of(recording).seen else None
 
 
 def _time(recording: Recording) -> str:
