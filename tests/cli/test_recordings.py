@@ -120,7 +120,7 @@ def test_inspect_shows_what_is_inside(imufmu, log):
         "800 rows over 7.99 s from 0 s, 100 Hz",
         "rad/s from wx, wy, wz",
         "up along +z, at rest, accel reads 1 g",
-        "gyro and accel fit together",
+        "fit together: gravity turns as the gyroscope says",
     ):
         assert words in text
     code, text, _ = imufmu("inspect", log, *TOLD, "--json")

@@ -56,6 +56,15 @@ def test_android_with_its_own_clock_per_sensor(tmp_path):
     assert "accel has other times than gyro: interpolated" in recording.notes
 
 
+def test_a_gap_of_one_sensor_is_not_bridged(tmp_path):
+    folder = tmp_path / "phone"
+    sensor_logger(folder, "Gyroscope.csv", TIME, GYRO)
+    kept = np.flatnonzero((TIME < 5) | (TIME > 6))
+    sensor_logger(folder, "TotalAcceleration.csv", TIME[kept] + 0.003, ACCEL[kept])
+    missing = np.isnan(read(folder).accel).all(axis=1)
+    assert missing.sum() == pytest.approx(100, abs=6)  # two periods at either end are
+
+
 @pytest.mark.parametrize(("standard", "sign"), [("false", -1), ("true", 1)])
 def test_an_iphone_gives_motion_and_gravity_apart_with_its_sign(tmp_path, standard, sign):
     folder = tmp_path / "phone"

@@ -52,6 +52,12 @@ def test_a_recording_is_read_as_remembered_and_a_note_says_so(log):
     assert np.allclose(again.gyro, np.rad2deg(MOTION["gyro"]), atol=1e-6)
 
 
+def test_a_rate_is_remembered_until_another_is_given(log):
+    remember(log, Told(parsed_columns(["gyro=wx,wy,wz:deg/s"]), rate=50.0))
+    assert read(log).sample_period == 0.02
+    assert read(log, rate=100.0).sample_period == 0.01
+
+
 @pytest.mark.parametrize(
     ("text", "message"),
     [

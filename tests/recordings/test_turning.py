@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from imufmu.files.csv_table import write_csv
 from imufmu.recordings.checks import axes_doubts
 from imufmu.recordings.reading import RecordingError, read
 from imufmu.recordings.turning import DEGREE, best_scale, told, turning
@@ -66,6 +67,14 @@ def test_the_unit_and_a_constant_offset_of_the_accelerometer_do_not_matter():
     assert said(GYRO, -ACCEL) == ""  # which cannot be seen
 
 
+def test_a_body_that_is_shaken_is_told_from_a_flipped_axis():
+    """Two metres per second squared to and fro, three times a second, beside the turning."""
+    shaken = ACCEL + 2 * np.sin(2 * np.pi * 3 * MOTION["time"])[:, None] * [1, 0.7, 0.4]
+    assert said(GYRO, shaken) == ""
+    assert "left-handed" in said(-GYRO, shaken)
+    assert "axis x of gyro is flipped" in said(GYRO * [-1, 1, 1], shaken)
+
+
 def test_at_rest_nothing_can_be_told():
     rng = np.random.default_rng(1)
     still = rng.normal((0, 0, 9.81), 0.02, (2000, 3))
@@ -87,6 +96,43 @@ def test_the_unit_of_a_gyroscope_is_told_by_gravity():
     assert best_scale(GYRO, ACCEL, INDEX, 0.01, scales) == 0
     assert best_scale(np.rad2deg(GYRO), ACCEL, INDEX, 0.01, scales) == 1
     assert best_scale(0 * GYRO, ACCEL[:1].repeat(len(GYRO), axis=0), INDEX, 0.01, scales) == -1
+
+
+def recorded(folder, **changed: np.ndarray):
+    columns = {name: MOTION[name] for name in ("time", "gyro", "accel", "mag")} | changed
+    write_csv(folder / "walk.csv", columns)
+    return read(folder / "walk.csv")
+
+
+def test_of_three_sensors_the_one_is_wrong_that_fits_neither_of_the_others(tmp_path):
+    """As the magnetometer of the MPU-9250, whose x and y are swapped and whose z is turned over."""
+    swapped = MOTION["mag"][:, [1, 0, 2]] * [1, 1, -1]
+    recording = recorded(tmp_path, mag=swapped)
+    (doubt,) = axes_doubts(recording)
+    assert "mag does not turn" in doubt and "--columns mag=mag[2],mag[1],-mag[3] (South" in doubt
+    remedy = doubt.split("--columns ")[1].split(" ")[0]
+    mended = read(recording.path, columns=[remedy])
+    assert axes_doubts(mended) == [] and np.allclose(mended.mag, MOTION["mag"])
+    (doubt,) = axes_doubts(recorded(tmp_path, accel=ACCEL * [1, 1, -1]))
+    assert (
+        "accel does not turn" in doubt and "--columns accel=-accel[1],-accel[2],accel[3], or with every sign" in doubt
+    )
+    (doubt,) = axes_doubts(recorded(tmp_path, gyro=GYRO * [1, -1, 1]))
+    assert "axis y of gyro is flipped" in doubt
+    assert axes_doubts(recorded(tmp_path)) == []
+
+
+def test_a_magnetometer_that_stands_still_says_nothing_of_the_gyroscope(tmp_path):
+    (doubt,) = axes_doubts(recorded(tmp_path, mag=np.tile([0.0, 20, -45], (len(GYRO), 1))))
+    assert "mag does not turn" in doubt and "stands still" in doubt
+    assert axes_doubts(recorded(tmp_path, mag=0 * GYRO)) == []
+
+
+def test_where_gravity_is_drowned_in_motion_the_field_tells(tmp_path):
+    wild = ACCEL + 25 * np.sin(2 * np.pi * 1.3 * MOTION["time"])[:, None] * [1, 0.7, 0.4]
+    assert not turning(GYRO, wild, INDEX, 0.01).seen
+    (doubt,) = axes_doubts(recorded(tmp_path, gyro=-GYRO, accel=wild))
+    assert "gyro turns the other way than the magnetic field" in doubt
 
 
 @pytest.mark.slow

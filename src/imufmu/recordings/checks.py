@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import lru_cache
 
+import numpy as np
+
 from .reading import Recording
-from .turning import Turning, told, turning
+from .turning import UNKNOWN, Turning, columns_told, told, turning
 
 
 @lru_cache(maxsize=4)
@@ -14,9 +17,49 @@ def turning_of(recording: Recording) -> Turning:
     return turning(recording.gyro, recording.accel, recording.sample_index, recording.sample_period)
 
 
+@lru_cache(maxsize=4)
+def field_turning_of(recording: Recording) -> Turning:
+    """Whether gyroscope and magnetometer fit together; unknown without one, or where it is much slower."""
+    if recording.mag is None:
+        return UNKNOWN
+    return turning(recording.gyro, recording.mag, recording.sample_index, recording.sample_period)
+
+
 def axes_doubts(recording: Recording) -> list[str]:
-    """What does not fit between gyroscope and accelerometer, and what to do: at most one sentence."""
-    if not (names := recording.names.get("gyro")):
-        names = ("gyro[1]", "gyro[2]", "gyro[3]")
-    said = told(turning_of(recording), names)
-    return [said] if said else []
+    """What does not fit between gyroscope, accelerometer and magnetometer, and what to do: at most one sentence.
+
+    Of three sensors the one is wrong that fits neither of the others.
+    """
+    by_gravity, by_field = turning_of(recording), field_turning_of(recording)
+    gravity_fits, field_fits = by_gravity.fits and by_gravity.seen, by_field.fits and by_field.seen
+    if not by_gravity.fits and field_fits and by_gravity.is_of_vector:
+        matrix = by_gravity.vector_matrix
+        return [
+            "accel does not turn as gyro and mag say: its axes are not theirs; it fits as --columns "
+            f"accel={columns_told(matrix, _names(recording, 'accel'))}, or with every sign turned"
+        ]
+    if not by_gravity.fits:
+        return [told(by_gravity, _names(recording, "gyro"))]
+    if gravity_fits and not by_field.fits and by_field.scale != 1:
+        return ["mag does not turn as gyro and accel say: it stands still, or is disturbed all the time"]
+    if gravity_fits and not by_field.fits and by_field.is_of_vector:
+        matrix = _downwards(recording, by_field.vector_matrix)
+        return [
+            "mag does not turn as gyro and accel say: its axes are not theirs; it fits as --columns "
+            f"mag={columns_told(matrix, _names(recording, 'mag'))} (South of the equator with every sign turned)"
+        ]
+    if not by_field.fits and by_field.scale == 1:
+        return [told(by_field, _names(recording, "gyro"), "the magnetic field")]
+    return []
+
+
+def _names(recording: Recording, signal: str) -> Sequence[str]:
+    return recording.names.get(signal) or [f"{signal}[{i}]" for i in (1, 2, 3)]
+
+
+def _downwards(recording: Recording, matrix: np.ndarray) -> np.ndarray:
+    """The matrix of the magnetometer's axes, or minus it: so that the field points down, as North of the equator."""
+    assert recording.mag is not None
+    upwards = (recording.mag @ matrix.T * recording.accel).sum(axis=1)
+    known = upwards[np.isfinite(upwards)]
+    return np.asarray(-matrix if known.size and np.median(known) > 0 else matrix)

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..blocks.vocabulary import GRAVITY
-from .checks import axes_doubts, turning_of
+from .checks import axes_doubts, field_turning_of, turning_of
 from .faults import RecordingError
 from .reading import TEXTS, Recording, read, recordings_in
 from .text_table import read_table
@@ -86,7 +86,7 @@ def overview(
                     "seconds": float(recording.time[-1] - recording.time[0]),
                     "missing": missing,
                     "signals": [*recording.readings, *recording.truth],
-                    "fits": not axes_doubts(recording) if turning_of(recording).seen else None,
+                    "fits": _fits(recording),
                 }
             )
         if progress:
@@ -94,6 +94,13 @@ def overview(
     if not facts:
         raise RecordingError(f"{folder}: no recording in it" + (f"; {faults[0]}" if faults else ""))
     return facts, faults
+
+
+def _fits(recording: Recording) -> bool | None:
+    """Whether the axes fit together; None where nothing tells."""
+    if axes_doubts(recording):
+        return False
+    return True if turning_of(recording).seen or field_turning_of(recording).seen else None
 
 
 def _time(recording: Recording) -> str:
@@ -170,10 +177,13 @@ def _start(recording: Recording) -> str:
 
 def _axes(recording: Recording, doubtful: list[str]) -> str:
     if doubtful:
-        return "gyro and accel do not fit together"
-    if turning_of(recording).seen:
-        return "gyro and accel fit together: gravity turns as the gyroscope says"
-    return "too little turning, or too much motion, to tell whether gyro and accel fit together"
+        return "gyro and accel, or mag, do not fit together"
+    fits = [
+        name for name, of in (("gravity", turning_of), ("the magnetic field", field_turning_of)) if of(recording).seen
+    ]
+    if fits:
+        return f"fit together: {' and '.join(fits)} turn{'s' * (len(fits) == 1)} as the gyroscope says"
+    return "too little turning, or too much motion, to tell whether they fit together"
 
 
 def _clipping(recording: Recording) -> list[str]:

@@ -51,14 +51,30 @@ class Turning:
     def fits(self) -> bool:
         return self.scale == 1 and bool((self.matrix == np.eye(3)).all())
 
+    @property
+    def is_of_vector(self) -> bool:
+        """Whether it can be the vector whose axes are wrong, and not the gyroscope's."""
+        return self.scale == 1 and bool(np.linalg.det(self.matrix) > 0)
+
+    @property
+    def vector_matrix(self) -> np.ndarray:
+        """What the vector's readings have to be multiplied with, but for the sign of all, if it is they that are wrong.
+
+        Right readings v turn as v' = v x w. With S v in their place that is (S v)' = (S v) x (det S) (S w), so that the
+        gyroscope seems to need det(S) S: a rotation, the same for S and -S.
+        """
+        return np.asarray(self.matrix.T)
+
+
+UNKNOWN = Turning(np.eye(3), 1.0, False)
+
 
 @np.errstate(over="ignore", invalid="ignore")  # of absurd values nothing is told
 def turning(gyro: np.ndarray, accel: np.ndarray, index: np.ndarray, period: float) -> Turning:
     """Readings (n, 3), rad/s and any unit, their whole-number instants (n,) and the sample period (s)."""
-    unknown = Turning(np.eye(3), 1.0, False)
     windows = _windows(gyro, accel, index, period)
     if windows is None:
-        return unknown
+        return UNKNOWN
     as_is = float(_incoherences([np.eye(3)], *windows)[0])
     opposite = float(_incoherences([-np.eye(3)], *windows)[0])
     as_they_are = Turning(np.eye(3), 1.0, as_is < _CLEARLY_LESS * opposite and opposite > _SEEN)
@@ -89,36 +105,46 @@ def best_scale(gyro: np.ndarray, accel: np.ndarray, index: np.ndarray, period: f
     return int(np.argmin(found)) if best < _CLEARLY_LESS * second and second > 1e-4 else -1
 
 
-def told(fit: Turning, names: Sequence[str] = ("gyro[1]", "gyro[2]", "gyro[3]")) -> str:
-    """What does not fit, and what to do, in one sentence; empty where everything does. names: columns of the gyro."""
+def columns_told(matrix: np.ndarray, names: Sequence[str]) -> str:
+    """Columns x, y, z after a signed permutation, as a user tells them."""
+    signs, order = matrix.sum(axis=1), np.abs(matrix).argmax(axis=1)
+    return ",".join(("-" if signs[i] < 0 else "") + names[order[i]] for i in range(3))
+
+
+def told(fit: Turning, names: Sequence[str] = ("gyro[1]", "gyro[2]", "gyro[3]"), what: str = "gravity") -> str:
+    """What does not fit, and what to do, in one sentence; empty where everything does.
+
+    names: columns of the gyro. what: gravity, seen by the accelerometer, or the magnetic field.
+    """
     if fit.fits:
         return ""
     said = []
     if abs(fit.scale - DEGREE) < 1e-9:
-        said.append("gyro turns 57 times as far as gravity: its values are in deg/s")
+        said.append(f"gyro turns 57 times as far as {what}: its values are in deg/s")
     elif abs(fit.scale - 1 / DEGREE) < 1e-6:
-        said.append("gyro turns 57 times less far than gravity: its values are not in deg/s")
+        said.append(f"gyro turns 57 times less far than {what}: its values are not in deg/s")
     elif fit.scale != 1:
-        said.append(f"gyro turns {1 / fit.scale:g} times as far as gravity: its range is set otherwise than assumed")
+        said.append(f"gyro turns {1 / fit.scale:g} times as far as {what}: its range is set otherwise than assumed")
     matrix = fit.matrix
     signs, order = matrix.sum(axis=1), np.abs(matrix).argmax(axis=1)
     flipped = ["xyz"[i] for i in range(3) if signs[i] < 0]
     if (order == range(3)).all() and len(flipped) == 3:
         said.append(
-            "gyro turns the other way than gravity about every axis: the axes are a left-handed set (one axis is "
+            f"gyro turns the other way than {what} about every axis: the axes are a left-handed set (one axis is "
             "flipped, or two are swapped, in both sensors), or gyro is negated"
         )
     elif (order == range(3)).all() and len(flipped) == 2:
         kept = "xyz"[next(i for i in range(3) if signs[i] > 0)]
-        said.append(f"axis {kept} of accel is flipped, or {' and '.join(flipped)} of gyro are")
+        vector = "accel" if what == "gravity" else "mag"
+        said.append(f"axis {kept} of {vector} is flipped, or {' and '.join(flipped)} of gyro are")
     elif flipped and (order == range(3)).all():
         said.append(f"axis {flipped[0]} of gyro is flipped")
     elif not (order == range(3)).all():
-        said.append("axes of gyro and accel are not the same: two or more are swapped")
-    columns = ",".join(("-" if signs[i] < 0 else "") + names[order[i]] for i in range(3))
+        vector = "accel" if what == "gravity" else "mag"
+        said.append(f"axes of gyro and {vector} are not the same: two or more are swapped")
     unit = ":deg/s" if abs(fit.scale - DEGREE) < 1e-9 else ""
     fixes = (order != range(3)).any() or flipped or unit
-    return "; ".join(said) + (f"; gyro fits as --columns gyro={columns}{unit}" if fixes else "")
+    return "; ".join(said) + (f"; gyro fits as --columns gyro={columns_told(matrix, names)}{unit}" if fixes else "")
 
 
 def _oddness(candidate: tuple[float, np.ndarray]) -> tuple[int, int, int]:
