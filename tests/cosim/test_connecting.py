@@ -87,6 +87,11 @@ def test_an_angular_velocity_is_known_by_its_name(rates: dict[str, str], tmp_pat
     assert any("name no unit; taken for rad/s" in note for note in found.notes) == ("" in rates.values())
 
 
+def test_our_own_name_goes_before_one_that_ends_like_it(tmp_path: Path) -> None:
+    upper = {f"upper_{name}": unit for name, unit in FORCES.items()}
+    assert connect(plant(tmp_path, RATES | upper | FORCES)).found[1].startswith("accel: specific_force[1]")
+
+
 def test_units_of_the_plant_are_converted_in_the_description(tmp_path: Path) -> None:
     outputs = {f"w[{i}]": "deg/s" for i in (1, 2, 3)} | {f"f_b[{i}]": "g" for i in (1, 2, 3)}
     outputs |= {"roll": "deg", "pitch": "deg"} | {f"mag_{axis}": "T" for axis in "xyz"}
@@ -234,6 +239,29 @@ def test_an_estimator_of_others_is_wired_by_its_inputs(tmp_path: Path) -> None:
     without = fake_fmu(tmp_path / "half.fmu", inputs[:3], types=UNITS)
     with pytest.raises(WiringError, match=r"half\.fmu has no input that looks like accel: say --map half\.accel="):
         connect(plant(tmp_path, RATES | FORCES), estimators=[without])
+
+
+def test_the_speed_of_wheels_goes_to_plumb_where_the_user_says_so(tmp_path: Path) -> None:
+    outputs = RATES | FORCES | {"forward_speed": "", "v": "m"}
+    path = tmp_path / "my.ssd"
+    for mapping, fed in ((None, False), ({"forward_speed": "forward_speed:km/h"}, True)):
+        path.write_bytes(
+            connect(plant(tmp_path, outputs), estimators=["plumb", "lee2012"], mapping=mapping).text(tmp_path)
+        )
+        factors = factors_into(path, "plumb")
+        assert factors.get("forward_speed") == (pytest.approx(1 / 3.6, rel=1e-15) if fed else None)
+        assert "forward_speed" not in factors_into(path, "lee2012")
+        values = {value.name: value.value for value in read_description(path).values}
+        assert ("plumb.forward_speed_valid" in values) == fed
+    with pytest.raises(WiringError, match="m and m/s differ in kind"):
+        connect(plant(tmp_path, outputs), mapping={"forward_speed": "v"})
+
+
+def test_a_map_for_an_estimator_that_is_not_there_is_told(tmp_path: Path) -> None:
+    with pytest.raises(
+        WiringError, match=r"--map plum\.gyro=\.\.\.: there is no estimator 'plum'; there is imu, plumb"
+    ):
+        connect(plant(tmp_path, RATES | FORCES), mapping={"plum.gyro": "omega"})
 
 
 def test_sensors_of_the_plants_own_need_no_imu(tmp_path: Path) -> None:

@@ -49,11 +49,12 @@ def connect(
       imufmu connect plant.fmu --map accel=ax,-ay,-az --map quaternion=att:xyzw:to-world --out my.ssd
       imufmu run my.ssd --report my.html
 
-    WHAT is gyro, accel, mag, and of the truth vertical, roll, pitch, yaw, quaternion, matrix, external_acceleration,
-    position. NAME is a vector, or its elements with commas, - before one that points the other way; behind colons
-    follow the unit, if the FMU names none, and of a quaternion its order (wxyz, xyzw) and whether it turns the
-    components of a vector to-world or to-body. The accelerometer reads specific force: +9.8 on the axis that points up
-    at rest. The world's z axis points up. What is not clear is asked on a terminal, and refused elsewhere.
+    WHAT is gyro, accel, mag, forward_speed (of wheels, for plumb), and of the truth vertical, roll, pitch, yaw,
+    quaternion, matrix, external_acceleration, position. NAME is a vector, or its elements with commas, - before one
+    that points the other way; behind colons follow the unit, if the FMU names none, and of a quaternion its order
+    (wxyz, xyzw) and whether it turns the components of a vector to-world or to-body. The accelerometer reads
+    specific force: +9.8 on the axis that points up at rest. The world's z axis points up. What is not clear is
+    asked on a terminal, and refused elsewhere.
     """
     from ..cosim.connecting.connect import connect as connected
 

@@ -17,6 +17,7 @@ from ..fmi.build import cached_fmu
 from ..fmi.native import cached_native_fmu
 from ..fmi.own import is_ours
 from ..registry import BLOCKS
+from .arrays import one_by_one
 from .connecting.connect import connect
 from .connecting.matching import Ask
 from .description import Component, Description, DescriptionError, read_description
@@ -144,6 +145,7 @@ def _read(path: Path, native: bool, strict: bool, packages: Packages, inside: Pa
     interfaces = {part.name: Interface.of_model(part.name, part.model) for part in parts}
     problems = _instance_problems(parts)
     notes: list[str] = []
+    description = one_by_one(description, interfaces, problems)
     wiring = find_wiring(description, interfaces, problems, notes, faults)
     settings = bound_settings(wiring, problems, faults)
     faults = [fault.removeprefix(f"{path}, ") for fault in faults]

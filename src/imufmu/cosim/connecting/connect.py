@@ -19,7 +19,7 @@ from ..devices import DeviceValue, device_values
 from ..interface import Interface, WiringError
 from ..truth import COMPONENT, PLANT, Told, derived_names, knows_attitude
 from .description_xml import Part, Wire, written
-from .matching import ALIASES, READ, TOLD, Ask, Choice, Matcher, short, with_form
+from .matching import ALIASES, READ, SPEED, TOLD, Ask, Choice, Matcher, short, with_form
 
 IMU, NO_IMU = "imu", "none"
 _STOP = 10.0  # s, where neither the plant nor the user says
@@ -68,9 +68,10 @@ def connect(
 
     imu: a device, an .ssv file, "ideal", or "none" where the plant has sensors of its own. estimators: names or .fmu
     files. mapping: what is what, by gyro, accel, mag, vertical, roll, pitch, yaw, quaternion, matrix,
-    external_acceleration, position; a vector's name or its elements with commas, "-" for a turned sign, then behind
-    colons a unit and, of a quaternion, order and direction: "q:xyzw:to-world". An input of an estimator's FMU:
-    "component.gyro". rate: samples per second of everything. ask: answers a question with one of some texts.
+    external_acceleration, position, and forward_speed, of wheels, for plumb. It is a vector's name or its elements with
+    commas, "-" for a turned sign, then behind colons a unit and, of a quaternion, order and direction:
+    "q:xyzw:to-world". An input of an estimator's FMU: "component.gyro". rate: samples per second of everything. ask:
+    answers a question with one of some texts.
 
     Raises ArchiveError, WiringError with everything that is unclear, and ValueError.
     """
@@ -90,8 +91,18 @@ def connect(
     sources = {name: (PLANT, choice) for name, choice in read.items()}
     if str(imu) != NO_IMU:
         sources = _through_imu(result, sources, device, period, str(imu))
+    if SPEED.name in given:
+        speed = _given(outputs, SPEED.name, given[SPEED.name], problems)
+        sources |= {SPEED.name: (PLANT, speed)} if speed else {}
+        result.found += [f"{SPEED.name}: {speed}"] if speed else []
     for estimator in estimators:
         _add_estimator(result, estimator, sources, period, given, problems)
+    problems += [
+        f"--map {key}=...: there is no estimator {component!r}; there is {', '.join(p.name for p in result._parts[1:])}"
+        for key in given
+        for component in [key.rpartition(".")[0]]
+        if component and component not in {part.name for part in result._parts[1:]}
+    ]
     told = _truth(outputs, given, ask, problems, result)
     if problems:
         raise WiringError(path, problems, "cannot be connected by itself")
@@ -104,7 +115,7 @@ def connect(
 
 
 def _known_names(given: dict[str, str]) -> dict[str, str]:
-    known = {*READ, *TOLD}
+    known = {*READ, *TOLD, SPEED.name}
     for key in given:
         if key.rpartition(".")[2] not in {*known, *ALIASES}:
             raise ValueError(no_such("quantity", key, [*ALIASES, *sorted(known)]))
@@ -143,7 +154,7 @@ def _readings(
 
 def _given(matcher: Matcher, name: str, text: str, problems: list[str]) -> Choice | None:
     try:
-        return matcher.given({**READ, **TOLD}[name], text)
+        return matcher.given({**READ, **TOLD, SPEED.name: SPEED}[name], text)
     except ValueError as error:
         problems.append(f"--map {error}")
         return None
@@ -197,6 +208,9 @@ def _add_estimator(
             if choice:
                 inputs[quantity] = choice.variables, choice.unit, choice.factors
         has_period = any(v.name == "sample_period" and v.causality == "parameter" for v in model.modelVariables)
+        if SPEED.name in sources and any(v.name == SPEED.name and v.causality == "input" for v in model.modelVariables):
+            choice = matcher.given(SPEED, SPEED.name)
+            inputs[SPEED.name] = choice.variables, choice.unit, choice.factors
         lacking = [short(quantity) for quantity in READ if quantity not in inputs and quantity != "magnetic_field"]
         if lacking:
             problems.append(
@@ -212,11 +226,15 @@ def _add_estimator(
         for quantity, (_, reading) in _SENSORS.items():
             if reading.name in signals:
                 inputs[quantity] = reading.element_names(), reading.unit, (1.0,) * reading.size
+        if SPEED.name in signals:
+            inputs[SPEED.name] = [SPEED.name], SPEED.unit, (1.0,)
         if not {"angular_velocity", "specific_force"} <= inputs.keys():
             problems.append(
                 f"{estimator} takes {', '.join(signals)}: not the readings of one IMU; describe it in an .ssd"
             )
     values = {"sample_period": DeviceValue("Real", f"{period:.17g}", "s")} if has_period else {}
+    if SPEED.name in sources and SPEED.name in inputs:
+        values[f"{SPEED.name}_valid"] = DeviceValue("Real", "1", None)
     result._parts.append(Part(name, path, values))
     for quantity, (names, unit, factors) in inputs.items():
         if quantity in sources:

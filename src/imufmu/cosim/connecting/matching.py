@@ -51,6 +51,7 @@ READ = {
     ),
     "magnetic_field": Quantity("magnetic_field", 3, "uT", _FIELDS, ("mag", "magnetic", "b"), "in the sensor's axes?"),
 }
+SPEED = Quantity("forward_speed", 1, "m/s", ("forward speed",))  # of wheels; only where the user says so
 TOLD = {
     "vertical": Quantity("vertical", 3, "1", ("vertical", "up", "s z")),
     "roll": Quantity("roll", 1, "rad", ("roll", "roll angle")),
@@ -98,6 +99,7 @@ class Matcher:
         """
         fitting = [vector for vector in self._vectors if self._fits(quantity, vector)]
         sure = [vector for vector in fitting if _is_sure(quantity, vector)]
+        sure = [vector for vector in sure if " ".join(vector.words) == quantity.sure[0]] or sure  # upper_... is another
         perhaps = sure or [vector for vector in fitting if set(vector.words) & set(quantity.perhaps)]
         if not perhaps and by_unit:
             perhaps = [vector for vector in fitting if self._units.get(vector.elements[0])]
@@ -107,7 +109,8 @@ class Matcher:
             return None, ""
         shown = [str(self._choice(quantity, vector)) for vector in perhaps]
         if ask is None:
-            said = f"--map {short(quantity.name)}={','.join(perhaps[0].elements)}"
+            name = perhaps[0].name if PLACE not in perhaps[0].name else ",".join(perhaps[0].elements)
+            said = f"--map {short(quantity.name)}={name}"
             return None, f"{quantity.name} may be {' or '.join(shown)}; {quantity.doubt or 'which?'} Say it: {said}"
         answer = ask(f"Is this the {quantity.name}? {quantity.doubt}".strip(), [*shown, "none of these"])
         chosen = dict(zip(shown, perhaps, strict=True)).get(answer)

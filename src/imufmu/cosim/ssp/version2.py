@@ -19,9 +19,8 @@ _KINDS = {
     "local": "output",
     "unspecified": "inout",
 }
-_ONLY_TOLD = ("MetaData", "Signature")  # who made it and signed it: nothing that a run needs
+_ONLY_TOLD = ("MetaData", "Signature", "Dimension")  # who made and signed it; how large arrays are, as FMUs tell, too
 _LACKING = {
-    "Dimension": "an array; connect its elements, such as x[1], one by one",
     "Clock": "a clock; only values are exchanged",
 }
 _INDICES = ("startIndices", "endIndices")
