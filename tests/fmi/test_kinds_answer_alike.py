@@ -123,6 +123,7 @@ def reset(i: fmu.Fmu) -> Any:
 
 
 START = [setup(), enter, leave, step(0.0)]
+LATE = [setup(2.0), enter, leave, set_input(math.nan), step(2.0)]
 FAR = 2**31
 
 # Each list of calls up to one that is refused, or that only warns, and what follows a reset.
@@ -134,6 +135,9 @@ CALLS: dict[str, list[Call]] = {
     "the clock is set": [setup(), set_to(sample_time=1.0)],
     "a tunable parameter is set out of its range": [*START, set_to(sigma_a2=-1.0)],
     "a parameter is out of range at the end of initialisation": [setup(), enter, set_to(c_a=2.0, P0=math.nan), leave],
+    "inputs do not count among parameters out of range": [setup(), enter, set_to(c_a=2.0), set_input(math.nan), leave],
+    "the first parameter is out of range": [setup(), enter, set_to(sample_period=0.0), leave],
+    "the last parameter is out of range": [setup(), enter, set_to(initial_pitch=9.0), leave],
     "a parameter of whole numbers is out of range": [setup(), enter, set_to(mode=9), leave],
     "an input is not a number": [*START, set_input(math.nan), step(0.01), step(0.02), set_input(0.0), step(0.03)],
     "an input is infinite": [*START, set_input(-math.inf), step(0.01)],
@@ -174,6 +178,8 @@ CALLS: dict[str, list[Call]] = {
     "a state is cut short": [*START, cut_state],
     "all messages are wanted": [*START, log_all, set_input(math.nan), step(0.01), step(0.02, -1.0)],
     "only warnings are wanted": [*START, log_warnings, set_input(math.nan), step(0.01)],
+    "a get during initialisation, nothing set": [setup(2.0), enter, get("sample_time", "roll", "vertical[3]")],
+    "a reset forgets the start and what was missing": [*LATE, reset, enter, get("sample_time"), leave, *LATE[-2:]],
     "a reset": [*START, set_input(1.0), step(0.01), reset, *START, get("roll", "g", "sample_time")],
 }
 
@@ -208,7 +214,8 @@ def test_both_kinds_answer_the_same_calls_alike(calls: list[Call]) -> None:
 def test_what_is_wrong_is_refused_and_nothing_else() -> None:
     """The lists above do end in errors, so that equal answers are no equal silence."""
     well = {"nothing wrong", "whole numbers", "a get after terminate", "only warnings are wanted", "a reset"}
-    well |= {"an input is not a number", "an input is infinite"}
+    well |= {"an input is not a number", "an input is infinite", "a get during initialisation, nothing set"}
+    well |= {"a reset forgets the start and what was missing"}
     for name, calls in CALLS.items():
         instance = fmu.Fmu("lee2012", kind="native")
         statuses = [answer(instance, call)[0] for call in calls]

@@ -201,6 +201,7 @@ def test_logging_off_leaves_the_refusals() -> None:
         (True, ["logStatusWarning"], {WARNING}),
         (True, ["logStatusError", "logStatusFatal"], {ERROR}),
         (False, ["logStatusWarning"], {ERROR}),
+        (False, ["logStatusError"], {WARNING}),
         (False, [], set()),
     ],
 )
