@@ -134,6 +134,7 @@ CALLS: dict[str, list[Call]] = {
     "an output is set": [*START, set_to(roll=1.0)],
     "the clock is set": [setup(), set_to(sample_time=1.0)],
     "a tunable parameter is set out of its range": [*START, set_to(sigma_a2=-1.0)],
+    "a tunable parameter is set to its bounds": [*START, set_to(sigma_a2=1e-9), set_to(sigma_a2=1e6), get("sigma_a2")],
     "a parameter is out of range at the end of initialisation": [setup(), enter, set_to(c_a=2.0, P0=math.nan), leave],
     "inputs do not count among parameters out of range": [setup(), enter, set_to(c_a=2.0), set_input(math.nan), leave],
     "the first parameter is out of range": [setup(), enter, set_to(sample_period=0.0), leave],
@@ -215,7 +216,7 @@ def test_what_is_wrong_is_refused_and_nothing_else() -> None:
     """The lists above do end in errors, so that equal answers are no equal silence."""
     well = {"nothing wrong", "whole numbers", "a get after terminate", "only warnings are wanted", "a reset"}
     well |= {"an input is not a number", "an input is infinite", "a get during initialisation, nothing set"}
-    well |= {"a reset forgets the start and what was missing"}
+    well |= {"a tunable parameter is set to its bounds", "a reset forgets the start and what was missing"}
     for name, calls in CALLS.items():
         instance = fmu.Fmu("lee2012", kind="native")
         statuses = [answer(instance, call)[0] for call in calls]

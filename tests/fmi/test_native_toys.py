@@ -57,7 +57,10 @@ def test_a_toy_gives_the_numbers_of_the_run_in_process_also_from_a_saved_state(
     expected.p[:] = block.parameter_vector(settings(block))
     expected.initialise(3.0)
     references = [v.name for v in block.variables if v.group == "input"]
-    saved, t = fmu.serialised(started(block)), 3.0
+    seen = [v.name for v in block.variables if v.group in ("output", "local")]
+    first = started(block)
+    assert np.array_equal(first.get(*seen), expected.y)  # of the inputs' start values
+    saved, t = fmu.serialised(first), 3.0
     for k, row in enumerate(inputs(block)):
         h = H[k % len(H)]
         expected.u[:] = row
@@ -66,10 +69,10 @@ def test_a_toy_gives_the_numbers_of_the_run_in_process_also_from_a_saved_state(
         fmu.restore(actual, saved)
         actual.set(dict(zip(references, row, strict=True)))
         actual.step(t, h)
-        reported = actual.get(*(v.name for v in block.variables if v.group in ("output", "local")))
-        assert np.array_equal(reported, expected.y, equal_nan=True), k
+        assert np.array_equal(actual.get(*seen), expected.y, equal_nan=True), k
         saved, t = fmu.serialised(actual), t + h
         actual.close()
+    first.close()
 
 
 @TOYS
