@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
+import casadi as ca
 import numpy as np
 import pytest
 
-from imufmu.blocks.block import Block
+from imufmu.blocks.block import Block, ContinuousBlock
 from imufmu.blocks.instance import instantiate
 from imufmu.registry import BLOCKS
 from support import fmu
@@ -100,6 +104,36 @@ def test_the_derivatives_of_a_toy_are_those_of_its_last_sample(
         else:
             # Sums of numbers of the size 1 to 40: 1e-13 after the subtraction.
             np.testing.assert_allclose(actual, outcomes[0] - outcomes[1], rtol=0, atol=1e-12)
+    instance.close()
+
+
+def broken(place: str) -> ContinuousBlock:
+    """The oscillator, where a force above 1 leaves one number that is not finite: a state, the first or last output."""
+
+    def number(where: str, u: SimpleNamespace) -> Any:
+        return ca.sqrt(1 - u.force) if where == place else u.force
+
+    return replace(
+        OSCILLATOR,
+        name=f"broken_{place}",
+        dynamics=lambda x, u, p, t: dict(q=x.v, v=number("state", u)),
+        output=lambda x, u, p, t: dict(position=number("first", u), velocity=t, force_seen=t, clock=number("last", u)),
+    )
+
+
+@pytest.mark.parametrize("place", ["state", "first", "last"])
+def test_a_single_number_that_is_not_finite_is_enough_to_refuse_a_step(
+    place: str, started: Callable[[Block], fmu.Fmu]
+) -> None:
+    block = broken(place)
+    instance = started(block)
+    instance.step(3.0, 0.01)
+    before = fmu.serialised(instance)
+    instance.set({"force": 2.0})
+    assert "not finite at t = 3.02 s" in refusal(instance, lambda: instance.step(3.01, 0.01))
+    instance.set({"force": 0.0})
+    instance.get("clock")
+    assert fmu.serialised(instance) == before
     instance.close()
 
 
