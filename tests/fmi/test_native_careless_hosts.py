@@ -116,6 +116,18 @@ def test_calls_without_an_instance_are_errors() -> None:
     instance.slave.freeInstance()
 
 
+def test_every_number_but_zero_is_true() -> None:
+    instance = native()
+    switch, value = (c_uint * 1)(instance.variables["use_initial_angles"].valueReference), (c_int * 1)()
+    enter(instance)
+    for given, expected in ((2, 1), (0, 0), (-1, 1)):
+        assert call(instance, "SetBoolean", switch, 1, (c_int * 1)(given)) == OK
+        instance.set({"initial_roll": 0.3})
+        assert instance.get("roll") == [pytest.approx(0.3 * expected, abs=1e-15)]  # rounded once or twice
+        assert call(instance, "GetBoolean", switch, 1, value) == OK and value[0] == expected
+    instance.slave.freeInstance()
+
+
 def callbacks_into(messages: list[tuple[Any, ...]]) -> fmi2.fmi2CallbackFunctions:
     """Callbacks that collect instance name, status, category and text of each message."""
     callbacks = fmi2.fmi2CallbackFunctions()
