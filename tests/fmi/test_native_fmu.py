@@ -252,7 +252,7 @@ def test_a_state_that_was_changed_or_is_of_another_block_or_length_is_refused_an
     own = fmu.serialised(instance)
     other_build = own.replace(instance.model.guid.encode(), guid(BLOCKS["imu"], native=True).encode())
     assert own != other_build
-    places = [0, *range(48, len(own), 61)]  # before the GUID, and behind it
+    places = [0, *range(48, len(own), 61), len(own) - 1]  # before the GUID, and behind it
     changed = [own[:i] + bytes([own[i] ^ 1]) + own[i + 1 :] for i in places]
     for saved in (foreign, own[:-8], own + b"\0", other_build, *changed):
         message = refusal(instance, lambda saved=saved: fmu.restore(instance, saved))
