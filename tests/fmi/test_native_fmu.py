@@ -262,6 +262,17 @@ def test_a_state_that_was_changed_or_is_of_another_block_or_length_is_refused_an
     other.close()
 
 
+def test_a_state_that_another_fmu_keeps_is_refused() -> None:
+    instance, other = native().initialise(), native("imu").initialise()
+    before, state = instance.reals(), other.slave.getFMUstate()
+    message = refusal(instance, lambda: instance.slave.setFMUstate(state))
+    assert message == "lee2012: the state is that of another FMU and was not set"
+    assert instance.reals() == before
+    other.slave.freeFMUstate(state)
+    instance.close()
+    other.close()
+
+
 def test_a_state_is_not_written_into_less_room_than_it_needs() -> None:
     instance = native().initialise()
     state = instance.slave.getFMUstate()
