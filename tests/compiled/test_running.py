@@ -15,9 +15,11 @@ from imufmu.compiled import library, running
 from imufmu.registry import BLOCKS
 from support import motions
 from support.optional import needs
+from support.toys import LAZY, MIRROR, OSCILLATOR
 
-SAMPLED = [block for block in BLOCKS.values() if isinstance(block, SampledBlock)]
-CONTINUOUS = [block for block in BLOCKS.values() if isinstance(block, ContinuousBlock)]
+# The toys show all that the loop over rows hands to a block: inputs before, draws, the time of every solver step.
+SAMPLED = [MIRROR, LAZY, *(block for block in BLOCKS.values() if isinstance(block, SampledBlock))]
+CONTINUOUS = [OSCILLATOR, *(block for block in BLOCKS.values() if isinstance(block, ContinuousBlock))]
 needs_compiler = needs("a C compiler")
 
 
@@ -64,7 +66,9 @@ def test_a_compiled_record_is_the_interpreted_one_to_the_last_bit(block: Sampled
 @needs_compiler
 @pytest.mark.parametrize("block", CONTINUOUS, ids=lambda block: block.name)
 def test_a_compiled_plant_is_the_interpreted_one_to_the_last_bit(block: ContinuousBlock, at_once: None) -> None:
-    here, there = (way.simulate(block, 1.0, 0.02, start_time=5.0) for way in (running, interpreted))
+    rng = np.random.default_rng(6)
+    inputs = {s.name: s.start_values() + rng.uniform(0, 0.1, (51, s.size)) for s in block.inputs}
+    here, there = (way.simulate(block, 1.0, 0.02, inputs, start_time=5.0) for way in (running, interpreted))
     assert library.compiled(block).library(0) is not None
     for name, values in there.values.items():
         assert np.array_equal(here[name], values, equal_nan=True), name

@@ -207,6 +207,24 @@ def test_a_restored_state_remembers_that_it_warned(kind):
     instance.close()
 
 
+@pytest.mark.parametrize("entered", [False, True])
+def test_a_state_from_before_the_end_of_initialisation_holds_phase_and_start_time(kind, entered):
+    writer, reader = fmu.Fmu("lee2012", kind=kind), fmu.Fmu("lee2012", kind=kind).initialise(start_time=7.0)
+    writer.slave.setupExperiment(startTime=2.0)
+    if entered:
+        writer.slave.enterInitializationMode()
+    writer.set({"use_initial_angles": 1, "initial_roll": 0.3})
+    fmu.restore(reader, fmu.serialised(writer))
+    if not entered:
+        reader.slave.enterInitializationMode()
+    assert reader.get("sample_time", "roll") == [2.0, pytest.approx(0.3, abs=1e-15)]  # rounded once or twice
+    reader.slave.exitInitializationMode()
+    reader.step(2.0, 0.02)
+    assert reader.get("sample_time") == [2.01]
+    writer.slave.freeInstance()
+    reader.close()
+
+
 def test_outputs_during_initialisation_already_follow_inputs_and_parameters(kind):
     """A master exchanges outputs before the first step."""
     instance = fmu.Fmu("lee2012", kind=kind)

@@ -63,8 +63,16 @@ def set_integers(i: fmu.Fmu) -> Any:
     return i.slave.setInteger([*reference(i, "mode"), *reference(i, "n")], [2, 5])
 
 
+def set_input_as_integer(i: fmu.Fmu) -> Any:
+    return i.slave.setInteger(reference(i, "gyro[1]"), [1])
+
+
 def get_integers(i: fmu.Fmu) -> Any:
     return i.slave.getInteger([*reference(i, "n"), *reference(i, "mode")])
+
+
+def get_switches(i: fmu.Fmu) -> Any:
+    return i.slave.getBoolean([*reference(i, "use_initial_angles"), *reference(i, "early_is_moving")])
 
 
 def get_string(i: fmu.Fmu) -> Any:
@@ -123,17 +131,23 @@ def reset(i: fmu.Fmu) -> Any:
 
 
 START = [setup(), enter, leave, step(0.0)]
+LATE = [setup(2.0), enter, leave, set_input(math.nan), step(2.0)]
 FAR = 2**31
 
 # Each list of calls up to one that is refused, or that only warns, and what follows a reset.
 CALLS: dict[str, list[Call]] = {
     "nothing wrong": [*START, set_to(c_a=0.5), get("c_a", "roll", "sample_time"), step(0.01), same_state, terminate],
     "whole numbers": [setup(), set_integers, enter, get_integers, leave, step(0.0), get_integers],
+    "switches": [setup(), set_to(use_initial_angles=True), enter, get_switches, leave, step(0.0), get_switches],
     "a fixed parameter is set after the start": [*START, set_to(g=5.0)],
     "an output is set": [*START, set_to(roll=1.0)],
     "the clock is set": [setup(), set_to(sample_time=1.0)],
     "a tunable parameter is set out of its range": [*START, set_to(sigma_a2=-1.0)],
+    "a tunable parameter is set to its bounds": [*START, set_to(sigma_a2=1e-9), set_to(sigma_a2=1e6), get("sigma_a2")],
     "a parameter is out of range at the end of initialisation": [setup(), enter, set_to(c_a=2.0, P0=math.nan), leave],
+    "inputs do not count among parameters out of range": [setup(), enter, set_to(c_a=2.0), set_input(math.nan), leave],
+    "the first parameter is out of range": [setup(), enter, set_to(sample_period=0.0), leave],
+    "the last parameter is out of range": [setup(), enter, set_to(initial_pitch=9.0), leave],
     "a parameter of whole numbers is out of range": [setup(), enter, set_to(mode=9), leave],
     "an input is not a number": [*START, set_input(math.nan), step(0.01), step(0.02), set_input(0.0), step(0.03)],
     "an input is infinite": [*START, set_input(-math.inf), step(0.01)],
@@ -142,6 +156,8 @@ CALLS: dict[str, list[Call]] = {
     "a step that is not a number": [*START, step(0.01, math.nan)],
     "a step from no time": [*START, step(math.nan)],
     "a step that is far too long": [*START, step(0.01, 1e300)],
+    "a step that is a little too long": [*START, step(0.01, 1.5e6)],
+    "a step without an end": [*START, step(0.01, math.inf)],
     "a step from far away": [*START, step(1.5e6, 0.05)],
     "a step before initialisation": [setup(), step(0.0)],
     "a step during initialisation": [setup(), enter, step(0.0)],
@@ -166,6 +182,7 @@ CALLS: dict[str, list[Call]] = {
     "an integer is read as a real": [*START, get_as_real("mode")],
     "a real is read as an integer": [*START, get_as_integer("roll")],
     "an integer is set as a boolean": [*START, set_as_boolean("mode")],
+    "an input is set as an integer": [*START, set_input_as_integer],
     "the clock is read as an integer": [*START, get_as_integer("sample_time")],
     "a string is read": [*START, get_string],
     "a string is set": [*START, set_string],
@@ -174,6 +191,15 @@ CALLS: dict[str, list[Call]] = {
     "a state is cut short": [*START, cut_state],
     "all messages are wanted": [*START, log_all, set_input(math.nan), step(0.01), step(0.02, -1.0)],
     "only warnings are wanted": [*START, log_warnings, set_input(math.nan), step(0.01)],
+    "a get during initialisation, nothing set": [setup(2.0), enter, get("sample_time", "roll", "vertical[3]")],
+    "outputs stay while a parameter is out of range": [
+        setup(),
+        enter,
+        get("tilt_std"),
+        set_to(P0=math.nan),
+        get("tilt_std"),
+    ],
+    "a reset forgets the start and what was missing": [*LATE, reset, enter, get("sample_time"), leave, *LATE[-2:]],
     "a reset": [*START, set_input(1.0), step(0.01), reset, *START, get("roll", "g", "sample_time")],
 }
 
@@ -207,8 +233,17 @@ def test_both_kinds_answer_the_same_calls_alike(calls: list[Call]) -> None:
 
 def test_what_is_wrong_is_refused_and_nothing_else() -> None:
     """The lists above do end in errors, so that equal answers are no equal silence."""
-    well = {"nothing wrong", "whole numbers", "a get after terminate", "only warnings are wanted", "a reset"}
-    well |= {"an input is not a number", "an input is infinite"}
+    well = {
+        "nothing wrong",
+        "whole numbers",
+        "switches",
+        "a get after terminate",
+        "only warnings are wanted",
+        "a reset",
+    }
+    well |= {"an input is not a number", "an input is infinite", "a get during initialisation, nothing set"}
+    well |= {"outputs stay while a parameter is out of range"}
+    well |= {"a tunable parameter is set to its bounds", "a reset forgets the start and what was missing"}
     for name, calls in CALLS.items():
         instance = fmu.Fmu("lee2012", kind="native")
         statuses = [answer(instance, call)[0] for call in calls]

@@ -67,6 +67,15 @@ def test_the_derivative_of_a_sampled_block_is_at_the_inputs_of_its_last_sample()
     instance.close()
 
 
+def test_an_input_that_is_named_twice_changes_by_the_sum() -> None:
+    instance = native().initialise()
+    instance.step(0.0, 0.01)
+    roll, accel = ([instance.variables[name].valueReference] for name in ("roll", "accel[2]"))
+    twice = instance.slave.getDirectionalDerivative(roll, accel * 2, [0.25, 0.5])
+    assert twice == instance.slave.getDirectionalDerivative(roll, accel, [0.75]) != [0.0]
+    instance.close()
+
+
 def test_derivatives_are_of_outputs_with_respect_to_inputs_only() -> None:
     instance = native().initialise()
     assert "innovation[1] is not an output" in refusal(

@@ -11,7 +11,7 @@ import pytest
 from imufmu.compiled.compilers import compile_program
 from imufmu.files.locations import fmu_src_folder
 from support import c_host, fmu
-from support.optional import skip_without
+from support.optional import needs, skip_without
 from support.places import ROOT
 
 RUNS = 2
@@ -127,6 +127,19 @@ def test_a_host_with_logging_off_reads_on_stderr_what_is_wrong_and_only_once() -
     assert done.returncode == 0, done.stderr
     assert done.stderr == "lee2012: c_a = 2 is outside [0, 1]\n"
     assert done.stdout.split() == ["0", "6"]  # with logging on, each time our message and the wrapper's
+
+
+@needs("Linux")
+def test_a_python_host_that_unloads_fmus_does_not_gather_their_wrappers_in_memory() -> None:
+    """FMPy unpacks each time anew, so each time another library is loaded."""
+    done = in_python("""if True:
+        from pathlib import Path
+        for _ in range(3):
+            fmpy.simulate_fmu(path("lee2012"), stop_time=0.05, output_interval=0.01)
+            print(Path("/proc/self/maps").read_text().count("/lee2012.so"))
+    """)
+    assert done.returncode == 0, done.stderr
+    assert len(set(done.stdout.split())) == 1
 
 
 def test_the_path_of_a_python_host_does_not_grow() -> None:

@@ -52,7 +52,7 @@ class Fmu:
         logging: bool = True,
     ) -> None:
         self.kind = kind
-        self.model = description(name, kind)
+        self.model = fmpy.read_model_description(folder) if folder else description(name, kind)
         self.variables = {v.name: v for v in self.model.modelVariables}
         self.log: list[tuple[int, str]] = []
         self.slave = fmi2.FMU2Slave(

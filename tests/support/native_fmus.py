@@ -2,13 +2,26 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
+import fmpy
+
+from imufmu.blocks.block import Block
+from imufmu.fmi.native import build_native
 from support import fmu
 
 
 def native(name: str = "lee2012", **options: Any) -> fmu.Fmu:
     return fmu.Fmu(name, kind="native", **options)
+
+
+def unpacked_toy(block: Block, folder: Path) -> str:
+    """Folder of the unpacked native FMU of a block that the test has registered, built on the first call."""
+    unpacked = folder / f"{block.name}_unpacked"
+    if not unpacked.is_dir():
+        fmpy.extract(str(build_native(block.name, folder)), str(unpacked))
+    return str(unpacked)
 
 
 def enter(instance: fmu.Fmu) -> None:
