@@ -11,6 +11,7 @@ import pytest
 
 from imufmu.blocks.vocabulary import Status
 from imufmu.estimators.plumb import travel
+from imufmu.estimators.plumb.covariance import PSI, V, measure
 from support.plumb_motions import DEFAULTS, carried, consumer, moving, smooth, tilt_of
 
 DT = 0.01
@@ -52,3 +53,19 @@ def test_before_a_rest_a_velocity_that_was_there_is_believed_up_to_a_limit(X: fl
     variance, _, states = travel.velocity(ca.DM.zeros(3), ca.SX.zeros(18, 18), 0, 0, x, H, p)
     assert float(states["swell"]) == pytest.approx(X)
     assert np.allclose(ca.evalf(variance).full().ravel(), density / H, rtol=1e-12)
+
+
+@pytest.mark.parametrize(("speed", "levelled", "learns"), [(3.0, 0, 0), (3.0, 1, 1), (0.1, 0, 1)])
+def test_a_velocity_that_may_be_a_wrong_attitude_teaches_nothing_about_the_gyroscope(
+    speed: float, levelled: int, learns: int
+) -> None:
+    """A start in a bend: bias, scale and their covariance stay, until it is levelled or the velocity is small."""
+    x = SimpleNamespace(lasting=ca.DM([speed, 0, 0]), speed2=0.25, swell=0, doubt=0, quiet=0, fresh=0)
+    v_N = ca.DM([speed, 0, 0])
+    P = ca.SX.eye(18) + 0.5 * ca.SX.ones(18, 18)
+    variance, found, _ = travel.velocity(v_N, P, levelled, 0, x, 0.05, SimpleNamespace(**DEFAULTS))
+    assert float(ca.evalf(ca.SX(found))) == learns
+    error, after = measure(ca.SX.zeros(18), P, V, ca.vertsplit(-v_N), variance, found)
+    error, after = (ca.evalf(part).full() for part in (error, after))
+    assert np.all(error[PSI] != 0) and np.all(np.diag(after)[PSI] < 1.5)
+    assert np.all((error[6:] != 0) == learns) and np.all((np.diag(after)[6:] < 1.5) == learns)
