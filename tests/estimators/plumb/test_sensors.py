@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from imufmu.blocks.vocabulary import Status
 from support.plumb_motions import G, carried, consumer, mean_rates, moving, rms, smooth, tilt_of
 
 DT = 0.01
@@ -81,3 +82,24 @@ def test_the_default_timing_is_never_the_worst_and_costs_half_of_the_wrong_one(s
         assert errors[instants, right[instants]] < errors[instants, 3] < 0.65 * errors[instants, wrong[instants]]
     worst = {index: max(errors[False, index], errors[True, index]) for index in (1, 2, 3)}
     assert min(worst, key=lambda index: worst[index]) == 3
+
+
+@pytest.mark.parametrize(
+    ("name", "reading", "parameters", "flag"),
+    [
+        ("gyro", 80.0, {}, Status.GYRO_MISSING),  # rad/s; twice 2000 deg/s are 70
+        ("gyro", 20.0, {"gyro_range": LIMIT}, Status.GYRO_MISSING),
+        ("accel", 1200.0, {}, Status.ACCEL_MISSING),  # m/s2
+        ("accel", 200.0, {"accel_range": 16 * G}, Status.ACCEL_MISSING),
+    ],
+)
+def test_what_no_such_sensor_can_read_counts_as_missing(
+    name: str, reading: float, parameters: dict[str, float], flag: Status
+) -> None:
+    """Within what any sensor reads, but beyond the range of this one: as if the sample were not there."""
+    motion = moving(53, 12, rate=1.0, rest=3.0)
+    wrong, holes = consumer(motion), consumer(motion)
+    wrong[name][800], holes[name][800] = reading, np.nan
+    (error, found), (_, missing) = (tilt_of(motion, readings, **parameters) for readings in (wrong, holes))
+    assert found["status"][800] == flag and error.max() < 1
+    assert np.array_equal(found["vertical"], missing["vertical"])
