@@ -294,7 +294,7 @@ class SampledBlock(Block):
             return function(f"{self.name}_slow_step_{number}", [x, held, u, p, w], [slowed])
 
         choice = [slow(number, slow_step) for number, slow_step in enumerate(self.slow_steps, 1)]
-        return SlowParts(step, one_of(f"{self.name}_slow", choice), self._report(x, held, u, p, w))
+        return SlowParts(step, one_of(f"{self.name}_slow", choice), self._report(x, held, u, p, w), tuple(choice))
 
     def _report(self, x: Any, held: Any, u: Any, p: Any, w: Any) -> Any:
         """Function ``report`` of SlowParts: it is given the inputs without those that are missing."""

@@ -36,9 +36,11 @@ def functions_of(block: Block) -> dict[str, Any]:
 def derivatives_of(block: Block) -> dict[str, Any]:
     """The same for the derivatives of the outputs, which only FMUs have."""
     if isinstance(block, SampledBlock):
+        parts, name = block.slow_parts, f"{block.following_function.name()}_derivative"
+        following = parts and parts.derivative(name, total_size(block.outputs))
         return {
             "block_first_derivative": output_derivative(block, block.first_function),
-            "block_next_derivative": output_derivative(block, block.following_function),
+            "block_next_derivative": following or output_derivative(block, block.following_function),
         }
     assert isinstance(block, ContinuousBlock)
     return {"block_output_derivative": output_derivative(block, block.output_function)}
