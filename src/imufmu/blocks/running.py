@@ -101,7 +101,7 @@ def run(
     Raises ParameterError for parameters, ValueError for inputs that do not fit, StepError where the plant of a series
     diverges.
     """
-    u = _input_rows(block, inputs)
+    u = input_rows(block, inputs)
     p = block.parameter_vector(parameters)
     n = len(u)
     streams = _streams(block, p)
@@ -120,7 +120,7 @@ def run(
     time = start_time + np.arange(n) * period
     if block.has_solver and not np.isfinite(y).all():
         raise StepError(chain_diverged(block, time[np.argmin(np.isfinite(y).all(axis=1))], period))
-    return Trajectory(time, _by_name(block.reported, y), {signal.name: signal.unit for signal in block.reported})
+    return Trajectory(time, by_name(block.reported, y), {signal.name: signal.unit for signal in block.reported})
 
 
 def simulate(
@@ -142,7 +142,7 @@ def simulate(
     if not (0 < step < np.inf and 0.5 * step < duration < np.inf):
         raise ValueError(f"duration {duration} s must be finite and at least one step of {step} s")
     n = round(duration / step)
-    u = _input_rows(block, inputs or {}, n + 1)
+    u = input_rows(block, inputs or {}, n + 1)
     p = block.parameter_vector(parameters)
     per_row = solver_steps(step, p[_names(block).index("max_step")])
     if per_row > LONGEST_STEP:
@@ -153,7 +153,7 @@ def simulate(
     bad = np.flatnonzero(~np.isfinite(np.hstack([y, states])).all(axis=1))
     if bad.size:
         raise StepError(diverged(block, time[bad[0]], p[_names(block).index("max_step")]))
-    return Trajectory(time, _by_name(block.reported, y), {signal.name: signal.unit for signal in block.reported})
+    return Trajectory(time, by_name(block.reported, y), {signal.name: signal.unit for signal in block.reported})
 
 
 class Stream:
@@ -191,7 +191,7 @@ class Stream:
                 raise ValueError(f"{name}: {flat.size} values, expected {part.stop - part.start}")
             self._instance.u[part] = flat
         self._instance.sample()
-        values = _by_name(self._instance.block.reported, self._instance.y[None, :].copy())
+        values = by_name(self._instance.block.reported, self._instance.y[None, :].copy())
         result: dict[str, Any] = {name: value[0] for name, value in values.items()}
         return result | {"sample_time": self._instance.sample_time}
 
@@ -220,7 +220,7 @@ def _names(block: Block) -> list[str]:
     return [v.name for v in block.variables if v.group == "parameter"]
 
 
-def _input_rows(block: Block, inputs: Mapping[str, Any], length: int | None = None) -> np.ndarray:
+def input_rows(block: Block, inputs: Mapping[str, Any], length: int | None = None) -> np.ndarray:
     """Inputs as rows (n, size of all inputs); n is ``length``, or that of the longest input."""
     unknown = set(inputs) - {signal.name for signal in block.inputs}
     if unknown:
@@ -250,7 +250,7 @@ def _numbers(name: str, value: Any) -> np.ndarray:
         raise ValueError(f"{name}: not an array of numbers, or its rows differ in length") from None
 
 
-def _by_name(signals: Sequence[Signal], rows: np.ndarray) -> dict[str, np.ndarray]:
+def by_name(signals: Sequence[Signal], rows: np.ndarray) -> dict[str, np.ndarray]:
     result, first = {}, 0
     for signal in signals:
         result[signal.name] = rows[:, first : first + signal.size].reshape(len(rows), *signal.shape)

@@ -36,7 +36,7 @@ def replay(
     step_timeout: StepTimeout = STEP_TIMEOUT,
     local_variables: Annotated[bool, typer.Option("--locals", help="Also write the FMU's local variables.")] = False,
     offline: Annotated[
-        bool, typer.Option("--offline", help="Use the whole recording for every row: forward and backward, no FMU.")
+        bool, typer.Option("--offline", help="Use the whole recording for every row (plumb is smoothed). No FMU.")
     ] = False,
     plot: Plot = False,
 ) -> None:

@@ -3,18 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from ctypes import c_double, c_longlong
 from typing import Any
-
-import numpy as np
 
 from ..blocks import running
 from ..blocks.block import ContinuousBlock, SampledBlock
-from ..blocks.running import Trajectory, reached_at
-from ..blocks.signals import total_size
-from .library import compiled, pointer
-
-_SOLVER_STEPS = 10**6  # in one call, which nothing interrupts
+from ..blocks.running import Trajectory
+from .offline import run_offline
+from .rows import following, solved
 
 
 def run(
@@ -24,10 +19,15 @@ def run(
     *,
     initial_state: Mapping[str, Any] | None = None,
     start_time: float = 0.0,
+    offline: bool = False,
 ) -> Trajectory:
-    """As ``blocks.running.run``, to the last bit."""
+    """As ``blocks.running.run``, to the last bit; offline: as ``run_offline``, every row by the whole record."""
+    if offline:
+        if initial_state:
+            raise ValueError("an initial_state does not go with offline: it would hold for one end of the record only")
+        return run_offline(block, inputs, parameters, start_time=start_time)
     return running.run(
-        block, inputs, parameters, initial_state=initial_state, start_time=start_time, following=_following
+        block, inputs, parameters, initial_state=initial_state, start_time=start_time, following=following
     )
 
 
@@ -41,34 +41,4 @@ def simulate(
     start_time: float = 0.0,
 ) -> Trajectory:
     """As ``blocks.running.simulate``, to the last bit."""
-    return running.simulate(block, duration, step, inputs, parameters, start_time=start_time, solved=_solved)
-
-
-def _following(
-    block: SampledBlock, x: np.ndarray, u: np.ndarray, p: np.ndarray, w: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    library = compiled(block).library(len(u))
-    if library is None:
-        return running.interpreted(block, x, u, p, w)
-    x, u, w = x.copy(), np.ascontiguousarray(u), np.ascontiguousarray(w)
-    y = np.empty((len(u), total_size(block.reported)))
-    library.block_rows(c_longlong(len(u)), *map(pointer, (x, u, p, w, y)))
-    return x, y
-
-
-def _solved(
-    block: ContinuousBlock, x: np.ndarray, u: np.ndarray, p: np.ndarray, time: np.ndarray, step: float, per_row: int
-) -> tuple[np.ndarray, np.ndarray]:
-    n = len(time) - 1
-    library = compiled(block).library(n * per_row)
-    if library is None:
-        return running.solved_by_interpreter(block, x, u, p, time, step, per_row)
-    u, time, reached = map(np.ascontiguousarray, (u, time, reached_at(time, step)))
-    states, y = np.empty((n + 1, len(x))), np.empty((n + 1, total_size(block.reported)))
-    states[0] = x
-    h, rows = c_double(step / per_row), max(1, _SOLVER_STEPS // per_row)
-    for first in range(0, n, rows):
-        count, parts = min(rows, n - first), (states[first:], u[first:], p, time[first:])
-        library.block_rows(c_longlong(count), c_longlong(per_row), *map(pointer, parts), h)
-    library.block_outputs(c_longlong(n + 1), *map(pointer, (states, u, p, reached, y)))
-    return states, y
+    return running.simulate(block, duration, step, inputs, parameters, start_time=start_time, solved=solved)

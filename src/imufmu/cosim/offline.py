@@ -1,4 +1,4 @@
-"""Replay a recording through an estimator that sees all of it: forward and backward in time."""
+"""Replay a recording through an estimator that sees all of it."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from ..files.names import no_such
 from ..recordings.checks import axes_doubts
 from ..recordings.reading import Recording
 from ..registry import ESTIMATORS
-from .replay import Replay, in_axes_of
+from .replay import VALID, Replay, in_axes_of
 from .units import Unit, quantity
 
 
 def replay_offline(recording: Recording, name: str, parameters: Mapping[str, Any] | None = None) -> Replay:
-    """Gyroscope and accelerometer of the recording through an estimator of imufmu in both directions.
+    """Readings of the recording through an estimator of imufmu that knows all of them for every row.
 
     parameters: by name; ``sample_period`` follows the recording. Raises ValueError for an estimator that cannot do so
     and for parameters that do not fit.
@@ -28,7 +28,9 @@ def replay_offline(recording: Recording, name: str, parameters: Mapping[str, Any
         raise ValueError(no_such("estimator", name, list(blocks), "an FMU runs forward only"))
     block, readings = blocks[name], recording.at_instants()
     given = {name: _in_unit(block, name, value) for name, value in (parameters or {}).items()}
-    inputs = {signal.name: readings[signal.name] for signal in block.inputs if signal.name in ("gyro", "accel")}
+    inputs = {signal.name: readings[signal.name] for signal in block.inputs if signal.name in readings}
+    valid = {name + VALID: np.isfinite(rows).reshape(len(rows), -1).all(axis=1) for name, rows in inputs.items()}
+    inputs |= {signal.name: valid[signal.name] for signal in block.inputs if signal.name in valid}
     found = run_offline(block, inputs, {**given, "sample_period": recording.sample_period})
     units = {signal.name: signal.unit for signal in block.outputs}
     columns: dict[str, np.ndarray] = {}

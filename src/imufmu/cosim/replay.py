@@ -34,7 +34,7 @@ from .units import SAME, Unit, UnitError, conversion
 
 _READINGS = {signal.name: signal for signal in (GYRO, ACCEL, MAG, FORWARD_SPEED)}
 _OPTIONAL = (MAG.name, FORWARD_SPEED.name)
-_VALID = "_valid"  # end of the name of an input that is 1 where the reading of that name is to be used
+VALID = "_valid"  # end of the name of an input that is 1 where the reading of that name is to be used
 _BETWEEN_PROGRESS = 1000  # samples
 _SAME_PERIOD = 1e-6  # relative; a larger deviation would shift the sample clock by a sample within a minute or so
 
@@ -253,8 +253,8 @@ def _inputs(interface: Interface, recording: Recording, fmu: Path) -> tuple[list
                 continue
             used.append(variable)
             columns.append(values[:, i] if linear == SAME else linear.factor * values[:, i] + linear.offset)
-        if wanted and name + _VALID in inputs:
-            used.append(inputs[name + _VALID])
+        if wanted and name + VALID in inputs:
+            used.append(inputs[name + VALID])
             columns.append(np.isfinite(values).all(axis=1).astype(float))
     if problems:
         raise WiringError(fmu, problems, f"cannot replay {recording.path}")

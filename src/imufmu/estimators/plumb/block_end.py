@@ -59,7 +59,21 @@ from ...blocks.rotations import (
 )
 from ...blocks.signals import State
 from . import heading, readings, rest, start, travel, vehicle
-from .covariance import N_ERRORS, PSI, B, D, V, forgotten, full, measure, predicted, tilt_variance, upper_triangle
+from .covariance import (
+    N_ERRORS,
+    PSI,
+    B,
+    D,
+    V,
+    forgotten,
+    full,
+    kept,
+    measure,
+    noise_of_turn,
+    predicted,
+    tilt_variance,
+    upper_triangle,
+)
 
 LARGEST_BIAS = 1.0  # rad/s
 LARGEST_GYRO_ERROR = 0.2  # 1, each element of D
@@ -80,6 +94,21 @@ STATES = (
     State("tilt_std"),
     State("intensity"),
 )
+
+# What a smoother wants to know of a block, beside its results.
+RECORD = (
+    State("P_before", (N_ERRORS * (N_ERRORS + 1) // 2,)),
+    State("error", (N_ERRORS,)),
+    State("kept", (N_ERRORS,)),
+    State("S_block", (3, 3)),
+    State("dV_block", (3,)),
+    State("rate_block", (3,)),
+    State("Q_turn", (3, 3)),
+    State("anew"),
+    State("phi", (3,)),
+)
+
+SlowStep = Callable[[SimpleNamespace, SimpleNamespace, SimpleNamespace], Expressions]
 
 UNKNOWN: Expressions = dict(**travel.UNKNOWN, resting=0, rested=0, lost=0, leaned=ca.SX.zeros(2))
 
@@ -130,17 +159,19 @@ def end_at_start(x: SimpleNamespace, u: SimpleNamespace, p: SimpleNamespace) -> 
     # A turn as large as those at the start would make nonsense of what was learnt about the heading.
     anew = {name: ca.if_else(present, value, getattr(x, name)) for name, value in field.items()}
     lost = ca.if_else(ca.logic_and(after["coarse"], x.lost > 0), x.lost, ca.fmax(x.lost - H, 0))
+    record = kept_for_later(x, H, p, P_before=full(after["P"]), anew=1, turn=after.pop("phi"))
+    record |= dict(error=ca.SX.zeros(N_ERRORS))
     return (
         after
         | anew
         | dict(q0=after["q"], levelled=rests, resting=rests, fresh=rests, lost=lost, **EMPTY)
-        | (rest.block(x, H, p) | readings.range_seen(x))
+        | (rest.block(x, H, p) | readings.range_seen(x) | record)
     )
 
 
 def end_in_motion(x: SimpleNamespace, u: SimpleNamespace, p: SimpleNamespace) -> Expressions:
     """The end of a block in motion."""
-    v_N, P, H = predicted_block(x, p)
+    v_N, P, scale, H = predicted_block(x, p)
     known = ca.logic_or(x.levelled, x.rolling)
     lost = travel.is_lost(v_N, P, known, x, H, p)
     steady = rest.travels_steadily(x, p) * ca.logic_not(lost) * ca.logic_not(x.rolling)
@@ -149,8 +180,9 @@ def end_in_motion(x: SimpleNamespace, u: SimpleNamespace, p: SimpleNamespace) ->
     P = forgotten(P, forget, ca.if_else(lost, p.P0_v**2, p.rr_v2**2 / H))
     travels = ca.logic_and(known, ca.logic_not(lost))
     variance, learns, states = travel.velocity(v_N, P, travels, steady, x, H, p)
+    record = kept_for_later(x, H, p, P_before=P, kept=scale * kept(forget))
     error, P = measure(ca.SX.zeros(N_ERRORS), P, V, ca.vertsplit(-v_N), variance, learns)  # (7)
-    after = corrected(x, u, v_N, error, P, H, p, resting=0, steady=steady) | states
+    after = corrected(x, u, v_N, error, P, H, p, resting=0, steady=steady) | states | record
     goes_on = ca.logic_not(lost) * (states["quiet"] < p.t_v)
     after |= dict(levelled=ca.logic_and(x.levelled, goes_on), rolling=ca.logic_and(x.rolling, goes_on))
     anew = dict(UNKNOWN, **start.begin(p.g, p), lost=LOST_SHOWN)
@@ -159,40 +191,46 @@ def end_in_motion(x: SimpleNamespace, u: SimpleNamespace, p: SimpleNamespace) ->
 
 def end_in_vehicle(x: SimpleNamespace, u: SimpleNamespace, p: SimpleNamespace) -> Expressions:
     """The end of a block in a vehicle whose wheels tell its speed."""
-    x = upright(x, ca.if_else(x.coarse, x.dV, UP))  # one block says more than one sample
-    v_N, P, H = predicted_block(x, p)
+    turn = start.to_the_top(ca.if_else(x.coarse, x.dV, UP))  # one block says more than one sample
+    x = upright(x, turn)
+    v_N, P, scale, H = predicted_block(x, p)
     v_N, error, P, states = vehicle.measured_velocity(v_N, P, rate(x, x.gyro_used), H, x, u, p)
+    P_before, scale = states.pop("P_before"), scale * states.pop("kept")
+    record = kept_for_later(x, H, p, P_before=P_before, kept=scale, anew=x.coarse, turn=turn)
     after = corrected(x, u, v_N, error, P, H, p, resting=0, steady=0)
-    return after | dict(speed2=x.speed2, lasting=after["v"], coarse=0) | states
+    return after | dict(speed2=x.speed2, lasting=after["v"], coarse=0) | states | record
 
 
 def end_at_rest(x: SimpleNamespace, u: SimpleNamespace, p: SimpleNamespace) -> Expressions:
     """The end of a block at rest."""
-    v_N, P, H = predicted_block(x, p)
+    v_N, P, scale, H = predicted_block(x, p)
     variance, lasts = p.rr_v**2 / H, x.still_time >= p.rr_s
     travelled = surprising(v_N, P, x, variance)
     v_N, P = ca.if_else(travelled, 0, v_N), forgotten(P, travelled, variance)
     first = ca.logic_and(lasts, ca.logic_not(x.rested))
     for i in range(N_ERRORS)[B]:
         P[i, i] = ca.if_else(ca.logic_and(first, P[i, i] < p.P0_raw**2), p.P0_raw**2, P[i, i])
+    record = kept_for_later(x, H, p, P_before=P, kept=scale * kept(travelled))
     error, P = measure(ca.SX.zeros(N_ERRORS), P, V, ca.vertsplit(-v_N), variance)  # (9)
     error, P = measure(error, P, B, ca.vertsplit(x.gyro_lp - x.b), p.rr_g**2 / H)  # (9)
-    after = corrected(x, u, v_N, error, P, H, p, resting=1, steady=0) | stands(x, u)
+    after = corrected(x, u, v_N, error, P, H, p, resting=1, steady=0) | stands(x, u) | record
     return after | dict(levelled=ca.logic_or(x.levelled, lasts), rested=ca.logic_or(x.rested, lasts))
 
 
 def end_overruled(x: SimpleNamespace, u: SimpleNamespace, p: SimpleNamespace) -> Expressions:
     """The end of a block in which stillness shows that the attitude is wrong."""
-    x, H = upright(x, rotate(x.q, x.accel_lp)), block_length(x, p)
+    turn, H = start.to_the_top(rotate(x.q, x.accel_lp)), block_length(x, p)
+    x = upright(x, turn)
     std = ca.vertcat(OVERRULED, OVERRULED, p.P0_psi, *[p.rr_v / ca.sqrt(H)] * 3, *[p.P0_raw] * 3, *[p.P0_D] * 9)
     nothing, P = ca.SX.zeros(N_ERRORS), ca.diag(std**2)
     after = corrected(x, u, ca.SX.zeros(3), nothing, P, H, p, resting=1, steady=0) | stands(x, u)
-    return after | dict(levelled=0, level=1, lost=LOST_SHOWN)
+    record = kept_for_later(x, H, p, P_before=P, anew=1, turn=turn)
+    return after | dict(levelled=0, level=1, lost=LOST_SHOWN) | record
 
 
-def upright(x: SimpleNamespace, up: Any) -> SimpleNamespace:
-    """x with N turned so that this vector in N points up."""
-    turn = quaternion_from_rotation_vector(start.to_the_top(up))
+def upright(x: SimpleNamespace, turn: Any) -> SimpleNamespace:
+    """x with N turned by this rotation vector."""
+    turn = quaternion_from_rotation_vector(turn)
     R = matrix_from_quaternion(turn)
     turned = dict(q=unit(multiply(turn, x.q)), q0=unit(multiply(turn, x.q0)), dV=R @ x.dV, S=R @ x.S)
     return SimpleNamespace(**vars(x) | turned)
@@ -214,11 +252,15 @@ def block_length(x: SimpleNamespace, p: SimpleNamespace) -> Any:
     return x.samples * p.sample_period
 
 
-def predicted_block(x: SimpleNamespace, p: SimpleNamespace) -> tuple[Any, Any, Any]:
-    """Velocity and covariance at the end of a block before its measurements, and its length (s)."""
+def predicted_block(x: SimpleNamespace, p: SimpleNamespace) -> tuple[Any, Any, Any, Any]:
+    """Velocity and covariance at the end of a block before its measurements, factors of the errors, its length (s)."""
     H = block_length(x, p)
-    S = x.S + (matrix_from_quaternion(x.q0) - matrix_from_quaternion(x.q)) * p.sample_period / 2  # (2)
-    return x.v + x.dV - p.g * UP * x.T, predicted(full(x.P), S, x, H, p), H  # (4)
+    return x.v + x.dV - p.g * UP * x.T, *predicted(full(x.P), mean_attitude(x, p), x, H, p), H  # (4)
+
+
+def mean_attitude(x: SimpleNamespace, p: SimpleNamespace) -> Any:
+    """S (s) of the block."""
+    return x.S + (matrix_from_quaternion(x.q0) - matrix_from_quaternion(x.q)) * p.sample_period / 2  # (2)
 
 
 def rate(x: SimpleNamespace, y: Any) -> Any:
@@ -246,6 +288,7 @@ def corrected(
     return dict(
         q=q,
         q0=q,
+        error=error,
         v=v_N,
         b=within(x.b + error[B], LARGEST_BIAS),  # (10)
         D=within(x.D + ca.reshape(error[D], 3, 3).T, LARGEST_GYRO_ERROR),  # (10)
@@ -283,9 +326,43 @@ def told(x: SimpleNamespace, p: SimpleNamespace) -> dict[str, Any]:
     return dict(verdict=rest.verdict(x, p), tilt_std=tilt_std, intensity=root(x.speed2))
 
 
-def and_told(
-    slow_step: Callable[[SimpleNamespace, SimpleNamespace, SimpleNamespace], Expressions],
-) -> Callable[[SimpleNamespace, SimpleNamespace, SimpleNamespace], Expressions]:
+def kept_for_later(
+    x: SimpleNamespace,
+    H: Any,
+    p: SimpleNamespace,
+    *,
+    P_before: Any,
+    kept: Any = 1,
+    anew: Any = 0,
+    turn: Any = 0,
+) -> dict[str, Any]:
+    """RECORD after a block, but ``error``.
+
+    P_before: before the measurements. kept: factors (18,) of the errors of (5). turn: of N, where it began ``anew``.
+    """
+    return dict(
+        P_before=upper_triangle(P_before),
+        kept=kept * ca.SX.ones(N_ERRORS),
+        S_block=mean_attitude(x, p),
+        dV_block=x.dV,
+        rate_block=x.theta / H,
+        Q_turn=noise_of_turn(x, H, p),
+        anew=anew,
+        phi=turn * ca.SX.ones(3),
+    )
+
+
+def without_record(slow_step: SlowStep) -> SlowStep:
+    """A slow step that leaves out RECORD."""
+    names = {state.name for state in RECORD}
+
+    def step(x: SimpleNamespace, u: SimpleNamespace, p: SimpleNamespace) -> Expressions:
+        return {name: value for name, value in slow_step(x, u, p).items() if name not in names}
+
+    return step
+
+
+def and_told(slow_step: SlowStep) -> SlowStep:
     """A slow step, and what follows from the state after it."""
 
     def step(x: SimpleNamespace, u: SimpleNamespace, p: SimpleNamespace) -> Expressions:
@@ -296,4 +373,5 @@ def and_told(
 
 
 # Numbers RESTING to STARTING.
-SLOW_STEPS = tuple(map(and_told, (end_at_rest, end_overruled, end_in_motion, end_in_vehicle, begin, end_at_start)))
+STEPS = (end_at_rest, end_overruled, end_in_motion, end_in_vehicle, begin, end_at_start)
+SLOW_STEPS = tuple(map(without_record, map(and_told, STEPS)))

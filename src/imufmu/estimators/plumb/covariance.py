@@ -22,9 +22,9 @@ LARGEST_VARIANCE = 1.0  # rad2 of psi, rad2/s2 of b
 I3 = ca.SX.eye(3)
 
 
-def predicted(P: Any, S: Any, x: SimpleNamespace, H: Any, p: SimpleNamespace) -> Any:
-    """Covariance at the end of a block, from that at its beginning."""
-    R, minus_dV, theta = matrix_from_quaternion(x.q), -skew(x.dV), x.theta / H
+def predicted(P: Any, S: Any, x: SimpleNamespace, H: Any, p: SimpleNamespace) -> tuple[Any, Any]:
+    """Covariance at the end of a block, from that at its beginning, and by what (18,) its bounds shrink the errors."""
+    minus_dV, theta = -skew(x.dV), x.theta / H
     psi = P[PSI, :] + S @ of_rate(P, theta)  # (5): covariance of psi' with every error at the beginning
     dv = P[V, :] + minus_dV @ P[PSI, :]  # (5): the same of dv'
     P = ca.SX(P)
@@ -32,11 +32,27 @@ def predicted(P: Any, S: Any, x: SimpleNamespace, H: Any, p: SimpleNamespace) ->
     P[PSI, V] = psi[:, V] + psi[:, PSI] @ minus_dV.T
     P[PSI, PSI] = psi[:, PSI] + of_rate(psi.T, theta).T @ S.T
     P[PSI, 6:], P[V, 6:] = psi[:, 6:], dv[:, 6:]
-    W = H * p.k_g**2 * theta @ theta.T + p.s_s**2 * ca.diag(x.blind)  # (6)
-    P[PSI, PSI] += (p.s_g**2 * H + p.k_j**2 * x.jerk) * I3 + R @ W @ R.T  # (6)
+    P[PSI, PSI] += noise_of_turn(x, H, p)
     P[V, V] += (p.s_a**2 * H + p.s_m**2 * (H - x.T) + p.k_a**2 * x.jolt) * I3  # (6)
     P[B, B] += p.s_b**2 * H * I3  # (6)
-    return bounded(ca.triu2symm(ca.triu(P)))
+    P = ca.triu2symm(ca.triu(P))
+    scale = within_bounds(P)
+    return P * (scale @ scale.T), scale
+
+
+def transition(S: Any, dV: Any, rate: Any) -> Any:
+    """F (18, 18) of (5); rate: theta / H. ``predicted`` is F P F' + Q, without the products by 0 and 1."""
+    F = ca.SX.eye(N_ERRORS)
+    F[PSI, B], F[V, PSI] = -S, -skew(dV)
+    F[PSI, D] = S @ ca.kron(I3, rate.T)
+    return F
+
+
+def noise_of_turn(x: SimpleNamespace, H: Any, p: SimpleNamespace) -> Any:
+    """Q of psi (3, 3) for a block."""
+    R, theta = matrix_from_quaternion(x.q), x.theta / H
+    W = H * p.k_g**2 * theta @ theta.T + p.s_s**2 * ca.diag(x.blind)  # (6)
+    return (p.s_g**2 * H + p.k_j**2 * x.jerk) * I3 + R @ W @ R.T  # (6)
 
 
 def of_rate(P: Any, theta: Any) -> Any:
@@ -44,12 +60,12 @@ def of_rate(P: Any, theta: Any) -> Any:
     return ca.vertcat(*(theta.T @ P[row : row + 3, :] for row in (9, 12, 15))) - P[B, :]
 
 
-def bounded(P: Any) -> Any:
-    """P with no more than LARGEST_VARIANCE for psi and b: the correlations stay."""
+def within_bounds(P: Any) -> Any:
+    """Factors (18,) of the errors that leave psi and b no more than LARGEST_VARIANCE: the correlations stay."""
     scale = ca.SX.ones(N_ERRORS)
     for i in (*range(N_ERRORS)[PSI], *range(N_ERRORS)[B]):
         scale[i] = ca.if_else(P[i, i] > LARGEST_VARIANCE, ca.sqrt(LARGEST_VARIANCE / P[i, i]), 1)
-    return P * (scale @ scale.T)
+    return scale
 
 
 def measure(error: Any, P: Any, part: slice, values: Sequence[Any], variance: Any, learns: Any = 1) -> tuple[Any, Any]:
@@ -72,11 +88,17 @@ def tilt_variance(P: Any) -> Any:
 
 def forgotten(P: Any, condition: Any, variance: Any = 0) -> Any:
     """P; where the condition holds, with errors of v of this variance that are independent of all others."""
-    keep = ca.SX.ones(N_ERRORS)
-    keep[V] = 1 - condition
+    keep = kept(condition)
     P = P * (keep @ keep.T)
     P[V, V] += condition * variance * I3
     return P
+
+
+def kept(forgotten: Any) -> Any:
+    """Factors (18,) of the errors where those of v are forgotten, and others take their place."""
+    keep = ca.SX.ones(N_ERRORS)
+    keep[V] = 1 - forgotten
+    return keep
 
 
 def upper_triangle(P: Any) -> Any:

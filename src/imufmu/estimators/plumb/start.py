@@ -55,15 +55,17 @@ def begin(gravity: Any, p: SimpleNamespace) -> Expressions:
 
 
 def end_of_block(x: SimpleNamespace, H: Any, p: SimpleNamespace) -> dict[str, Any]:
-    """q, v, P and STATES after a block."""
+    """q, v, P and STATES after a block, and phi."""
     resting = rest.at_rest(x)
     g, v_N, p_gg, p_gv, p_vv = measured(x, resting, H, p)
-    turn = quaternion_from_rotation_vector(to_the_top(g))  # (25)
+    phi = to_the_top(g)
+    turn = quaternion_from_rotation_vector(phi)  # (25)
     gravity = norm(g)
     seen = 2 * p_gg < (HAND_OVER * ca.fmax(gravity, p.g / 2)) ** 2
     known = ca.logic_or(seen, ca.logic_and(resting, x.still_time >= p.rr_s))
     return dict(
         q=unit(multiply(turn, x.q)),
+        phi=phi,
         v=rotate(turn, v_N),
         P=upper_triangle(handed_over(full(x.P), gravity, p_gg, p_gv, p_vv, p)),
         coarse=ca.logic_not(known),

@@ -39,7 +39,7 @@ from ...blocks.block import Expressions
 from ...blocks.rotations import matrix_from_euler, matrix_from_quaternion, unit
 from ...blocks.signals import Signal, State, real
 from ..kalman import surprise, update
-from .covariance import I3, N_ERRORS, PSI, B, V, forgotten
+from .covariance import I3, N_ERRORS, PSI, B, V, forgotten, kept
 
 GATE = 4.0  # standard deviations
 STANDING = 0.01  # m/s; a vehicle this slow may be at rest
@@ -79,7 +79,7 @@ def wheels_turn(u: SimpleNamespace) -> Any:
 def measured_velocity(
     v_N: Any, P: Any, w: Any, H: Any, x: SimpleNamespace, u: SimpleNamespace, p: SimpleNamespace
 ) -> tuple[Any, Any, Any, dict[str, Any]]:
-    """Velocity, errors and covariance after (12) to (14), and the states of this module.
+    """Velocity, errors and covariance after (12) to (14), and the states of this module with what came before those.
 
     v_N, P: predicted velocity and covariance. w: rate, in S.
     """
@@ -93,6 +93,7 @@ def measured_velocity(
     v_N = ca.if_else(anew, speed * forward + ca.cross(w_N, lever), v_N)
     P = forgotten(P, anew, p.P0_v**2)
     P[V, V] += p.s_c**2 * H * I3
+    before = dict(P_before=P, kept=kept(anew))
 
     v_r = v_N - ca.cross(w_N, lever)  # (11)
 
@@ -108,4 +109,5 @@ def measured_velocity(
     error, P = update(error, P, along, off, variance, agrees)  # (12)
     error, P = update(error, P, row(left, -ca.dot(forward, v_N)), -ca.dot(left, v_r), sideways**2 / H)  # (13)
     error, P = update(error, P, row(up, 0), -v_r[2], p.s_z**2 / H)  # (14)
-    return v_N, error, P, dict(rolling=1, disagreed=ca.if_else(agrees, 0, x.disagreed * (1 - anew) + H))
+    states = dict(rolling=1, disagreed=ca.if_else(agrees, 0, x.disagreed * (1 - anew) + H))
+    return v_N, error, P, states | before
