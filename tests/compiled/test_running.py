@@ -11,7 +11,7 @@ import pytest
 
 from imufmu.blocks import running as interpreted
 from imufmu.blocks.block import ContinuousBlock, SampledBlock
-from imufmu.compiled import library, running
+from imufmu.compiled import library, rows, running
 from imufmu.registry import BLOCKS
 from support import motions
 from support.optional import needs
@@ -87,7 +87,7 @@ def test_a_long_record_goes_on_where_a_portion_ends(at_once: None, monkeypatch: 
 def test_a_long_simulation_goes_on_where_a_call_ends(at_once: None, monkeypatch: pytest.MonkeyPatch) -> None:
     """So that it can be interrupted between calls. 51 rows of 20 solver steps, three of them in a call."""
     whole = running.simulate(BLOCKS["pendulum"], 1.02, 0.02)
-    monkeypatch.setattr(running, "_SOLVER_STEPS", 70)
+    monkeypatch.setattr(rows, "_SOLVER_STEPS", 70)
     in_calls = running.simulate(BLOCKS["pendulum"], 1.02, 0.02)
     assert all(np.array_equal(whole[name], in_calls[name]) for name in whole.values)
 
