@@ -19,6 +19,7 @@ _FACE: dict[str, tuple[str, str]] = {
         "compiled.offline": {"run_offline": ""},
         "compiled.running": {"run": "", "run_plant": "simulate"},
         "benchmarks.recordings": {"benchmark": ""},
+        "benchmarks.timing": {"device_timing": ""},
         "compiled.compilers": {"BuildError": ""},
         "cosim.description": {"DescriptionError": ""},
         "cosim.interface": {"WiringError": ""},

@@ -24,11 +24,19 @@ def run_smoothed(
     inputs: Mapping[str, Any], parameters: Mapping[str, Any] | None
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Time (s), vertical (n, 3) and tilt_std (rad) of every sample."""
-    u, p = input_rows(RECORDING, inputs), RECORDING.parameter_vector(parameters)
-    pieces = [_smoothed_piece(piece) for piece in _pieces(u, p)]
+    pieces = [_smoothed_piece(piece) for piece in blocks(inputs, parameters)]
+    p = RECORDING.parameter_vector(parameters)
     period = p[[signal.name for signal in RECORDING.parameters].index("sample_period")]
     vertical, deviation = (np.concatenate(parts) for parts in zip(*pieces, strict=True))
-    return np.arange(len(u)) * period, vertical, deviation
+    return np.arange(len(vertical)) * period, vertical, deviation
+
+
+def blocks(inputs: Mapping[str, Any], parameters: Mapping[str, Any] | None) -> Iterator[Rows]:
+    """What RECORDING tells, apart for every stretch without a restart.
+
+    AT_ENDS of the rows that end a block; the rest, with ``ends``, 1 for these, and ``tilt_variance`` of all.
+    """
+    return _pieces(input_rows(RECORDING, inputs), RECORDING.parameter_vector(parameters))
 
 
 def _pieces(u: np.ndarray, p: np.ndarray) -> Iterator[Rows]:
