@@ -9,6 +9,7 @@ import typer
 from ..scoring.table import Table
 from .console import Json, notes, print_entries, print_json, print_table, progress_bar
 from .recording_options import AxesOption, Columns, File, Mount, Rate, Remember, Stream, Time, read_told
+from .timing import tell_timing, timing_facts
 
 
 def inspect(
@@ -28,11 +29,12 @@ def inspect(
       imufmu inspect walk.csv
       imufmu inspect log.txt --columns gyro=wx,wy,wz:deg/s --columns accel=ax,ay,az:g --time t:ms --remember
       imufmu inspect drone.csv --axes NED --json
-      imufmu inspect broad                      a line per recording of a folder
+      imufmu inspect broad                      a line per recording of a folder, and the timing of its device
 
     The axes of gyroscope and accelerometer are checked against each other: gravity, seen in the sensor, must turn as
     the gyroscope says. That finds deg/s taken for rad/s, a flipped axis, swapped axes and a left-handed set, where
-    there is turning enough. Exit code 1 where they do not fit.
+    there is turning enough. Exit code 1 where they do not fit. Of a folder that holds several recordings of one device
+    plumb's gyro_index is told, too.
     """
     from ..recordings.faults import RecordingError
     from ..recordings.folders import is_recording_folder
@@ -65,7 +67,7 @@ def _inspect_folder(folder: Path, json: bool) -> None:
         facts, faults = overview(folder, progress)
     notes(faults)
     if json:
-        print_json({"recordings": facts, "findings": faults})
+        print_json({"recordings": facts, "findings": faults, "timing": timing_facts(folder)})
     else:
         words = {None: "cannot tell", True: "fit", False: "DO NOT FIT"}
         rows = [
@@ -80,3 +82,4 @@ def _inspect_folder(folder: Path, json: bool) -> None:
             for f in facts
         ]
         print_table(Table(["recording", "rate", "span", "missing", "axes", "signals"], rows, words=True))
+        tell_timing(folder)

@@ -28,6 +28,7 @@ def timing_facts(folder: Path) -> dict[str, Any]:
 
 def _found(folder: Path) -> Any:
     from ..benchmarks.timing import device_timing
+    from ..recordings.reading import recordings_in
 
     with progress_bar(f"timing of {folder}") as progress:
-        return device_timing(folder, progress)
+        return device_timing(recordings_in(folder), progress)
