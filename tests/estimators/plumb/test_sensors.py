@@ -103,3 +103,16 @@ def test_what_no_such_sensor_can_read_counts_as_missing(
     (error, found), (_, missing) = (tilt_of(motion, readings, **parameters) for readings in (wrong, holes))
     assert found["status"][800] == flag and error.max() < 1
     assert np.array_equal(found["vertical"], missing["vertical"])
+
+
+def test_a_level_that_is_not_quite_even_is_clipped_too() -> None:
+    """A device that calibrates its readings after they were clipped: its largest ones differ by a thousandth."""
+    motion = carried(T, roll=np.pi * smooth(T, 20, HALF_TURN))
+    clipped, whole = consumer(motion), consumer(motion)
+    over = np.abs(clipped["gyro"]) > LIMIT
+    uneven = LIMIT * (1 + np.random.default_rng(54).uniform(-1e-3, 1e-3, over.shape))
+    clipped["gyro"] = np.where(over, np.sign(clipped["gyro"]) * uneven, clipped["gyro"])
+    (error, found), (_, unclipped) = tilt_of(motion, clipped), tilt_of(motion, whole)
+    assert over.sum() >= 20 and error[ENDS] > 10
+    assert found["tilt_std"][ENDS] > 2 * unclipped["tilt_std"][ENDS]
+    assert error[ENDS + 500 :].max() < 3
