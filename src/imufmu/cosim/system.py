@@ -20,10 +20,11 @@ from ..registry import BLOCKS
 from .arrays import one_by_one
 from .connecting.connect import connect
 from .connecting.matching import Ask
-from .description import Component, Description, DescriptionError, read_description
+from .description import Description, DescriptionError, read_description
 from .interface import Interface, WiringError
 from .links import Link, Wiring
 from .settings import Setting, bound_settings, given_settings, merged
+from .ssp.flat import Component
 from .ssp.packages import Packages
 from .wiring import find_wiring
 
