@@ -103,7 +103,7 @@ def conversion(source: Unit | None, target: Unit | None) -> Linear:
     if source.name == target.name and (source.base is None or target.base is None):
         return SAME
     a, b = _base(source), _base(target)
-    if source.name == target.name and a and b and a.exponents == b.exponents:
+    if source.name == target.name and a and b and a.exponents[:_RAD] == b.exponents[:_RAD]:
         return SAME
     for unit, base in ((source, a), (target, b)):
         if base is None:
