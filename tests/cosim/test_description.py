@@ -13,8 +13,8 @@ from lxml import etree
 
 from imufmu import ArchiveError, DescriptionError, System, WiringError, locate, pack
 from imufmu.cosim import system as system_module
-from imufmu.cosim.description import NAMESPACES
 from imufmu.cosim.packing import PARAMETER_SET
+from imufmu.cosim.ssp.files import NAMESPACES
 from imufmu.registry import BLOCKS
 from support.cosim_stubs import binding, fake_fmu, parameter_set, simulate, stub, variable, write_ssd, write_zip
 

@@ -274,6 +274,7 @@ def test_an_archive_may_be_a_component_and_hold_several_descriptions(tmp_path: P
     elements = [component("early", "a.ssp"), component("late", "a.ssp#late.ssd")]
     result = simulate(write(tmp_path / "a.ssd", system("w", elements)))
     assert (result["early.clock.y"][0], result["late.clock.y"][0]) == (0.0, 9.0)
+    assert simulate(System.read(tmp_path / "a.ssp#late.ssd"))["clock.y"][0] == 9.0
     missing = write(tmp_path / "b.ssd", system("w", [component("none", "a.ssp#../one.ssd")]))
     with pytest.raises(ArchiveError, match=r"a\.ssp: \.\./one\.ssd is missing"):
         System.read(missing)

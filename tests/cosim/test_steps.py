@@ -186,3 +186,17 @@ def test_values_of_a_vector_go_by_index_not_by_the_order_of_the_fmu(tmp_path: Pa
 
 def test_infinity_is_no_number_either(tmp_path: Path) -> None:
     assert math.isinf(faulty(tmp_path, 7)["faulty.y"][-1])
+
+
+def test_start_values_and_steps_that_are_no_numbers_hinder_nobody(tmp_path: Path) -> None:
+    """They break the schema, which is noted; what an FMU does not say is as if it had not tried."""
+
+    def damaged(text: str) -> str:
+        text = text.replace("<ModelVariables>", '<DefaultExperiment stepSize="soon"/><ModelVariables>')
+        return text.replace('name="u"', 'name="u" initial="exact"').replace('start="0', 'start="zero')
+
+    fmu = edited_fmu(tmp_path / "clock.fmu", stub("clock"), damaged)
+    system = write_ssd(tmp_path / "s.ssd", {"clock": fmu, "other": stub("clock")}, ["other.y -> clock.u"])
+    result = simulate(system)
+    assert result["clock.y"].tolist() == [0, 0.5, 1.0, 1.5, 2.0]
+    assert any("zero" in note for note in result.notes)

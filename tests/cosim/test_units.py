@@ -88,6 +88,10 @@ def test_a_radian_that_a_file_forgets_is_known_from_the_name_and_rad_per_s_is_no
     assert factor(defined("deg/s", {"s": -1, "factor": math.pi / 180}), RAD) == math.pi / 180
     with pytest.raises(UnitError, match="rad/s and Hz differ in kind"):
         conversion(defined("rad/s", {"s": -1}), defined("Hz", {"s": -1}))
+    assert factor(defined("deg/s", {}), RAD) == math.pi / 180  # an empty definition, too
+    assert conversion(defined("pu", {}), Unit("1")) == Linear()
+    torque = {"kg": 1, "m": 2, "s": -2}
+    assert conversion(defined("N.m", torque), defined("N.m", torque | {"rad": -1})) == Linear()
 
 
 @pytest.mark.parametrize(("a", "b"), [("m", "s"), ("rad/s", "Hz"), ("deg", "1"), ("m/s2", "rad/s")])

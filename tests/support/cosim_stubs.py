@@ -15,8 +15,8 @@ from pythonfmu.builder import FmuBuilder
 
 import imufmu
 from imufmu import Result
-from imufmu.cosim.description import NAMESPACES
 from imufmu.cosim.slave import Slave
+from imufmu.cosim.ssp.files import NAMESPACES
 from support.places import built_once
 
 Call = tuple[str, str, tuple[Any, ...]]

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 
-from .description import Component, Connection, Description, End
+from .description import Description
 from .interface import Interface
+from .ssp.flat import Component, Connection, End
 
 _Sizes = dict[tuple[str, str], int]  # of the arrays, by element and connector
 

@@ -1,7 +1,6 @@
 """Read a system description: SSP 1.0 or 2.0 (System Structure and Parameterization), nested systems laid out flat.
 
-A component or system inside systems has the names of all of them, "chassis.wheel.brake", as the hierarchical names of
-SSP have it. The elements are read here, and not by a library: fmpy.ssp drops types and units of connectors, inline
+The elements are read here, and not by a library: fmpy.ssp drops types and units of connectors, inline
 mappings, transformations and the default experiment; pyssp-standard 0.9 drops transformations of connections,
 suppressUnitConversion, signal dictionaries and the lines that messages name, and stops at an experiment without times.
 
@@ -19,92 +18,24 @@ OMSimulator and of the Open Simulation Platform are understood, too:
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from lxml import etree
-
-from .ssp.connectors import Connector, connectors_of
-from .ssp.files import (
-    NAMESPACES,
-    DescriptionError,
-    Sources,
-    number,
-    read_bytes,
-    read_root,
-    required,
-    units_in,
-)
+from .ssp.connectors import Connector
+from .ssp.files import NAMESPACES, DescriptionError, Sources, number, read_bytes, read_root, units_in
+from .ssp.flat import ROOT, Component, Connection, Flat, system_of
 from .ssp.packages import Packages
-from .ssp.parameters import ParameterValue, bound_values
+from .ssp.parameters import ParameterValue
 from .ssp.signals import Dictionaries
-from .ssp.transformations import Transformation, transformation_of
 from .truth import Told, read_truth
-from .units import Unit
 
-FMU_TYPE = "application/x-fmu-sharedlibrary"
-_ROOT = "SystemStructureDescription"
-KINDS_OF_STEP = ("sampled", "continuous")
-_DEEPEST = 50  # systems in systems: more is a circle of references
 # Attributes that hold a step size (s), each with the type of the annotation that it is in.
 _STEPS = (
     ("org.imufmu", "Communication", "stepSize"),
     ("com.opensimulationplatform", "FixedStepAlgorithm", "baseStepSize"),
     ("org.openmodelica", "FixedStepMaster", "stepSize"),
 )
-
-__all__ = ["NAMESPACES", "Component", "Connection", "Connector", "Description", "DescriptionError", "End"]
-
-
-@dataclass(frozen=True)
-class Component:
-    """One FMU of the system. name: with those of the systems around it.
-
-    implementation: ModelExchange or CoSimulation where the description wants one of these; else any. treat: how it
-    steps, one of KINDS_OF_STEP, where an annotation says so.
-    """
-
-    name: str
-    description: str
-    source: Path
-    connectors: dict[str, Connector]
-    where: str
-    implementation: str = "any"
-    treat: str | None = None
-
-
-@dataclass(frozen=True)
-class End:
-    """One end of a connection. element: a component, a system ("" is the whole) or a signal dictionary.
-
-    role: whether values come out of this end ("source") or go into it ("sink"), as seen from the connection; "either"
-    where the other end tells; "component" where its FMU tells.
-    """
-
-    element: str
-    connector: str
-    role: str
-
-    def __str__(self) -> str:
-        return f"{self.element}.{self.connector}" if self.element else self.connector
-
-
-@dataclass(frozen=True)
-class Connection:
-    """A connection as written: its two ends, which do not say in which direction values go.
-
-    same_units: False where the author takes care of units (suppressUnitConversion).
-    """
-
-    start: End
-    end: End
-    transformation: Transformation
-    same_units: bool
-    where: str
-
-    def __str__(self) -> str:
-        return f"{self.where}: {self.start} -> {self.end}"
 
 
 @dataclass(frozen=True)
@@ -136,9 +67,9 @@ def read_description(path: Path, inside: Path | None = None, packages: Packages 
     ArchiveError for XML that is unsafe or not well-formed.
     """
     faults: list[str] = []
-    root = read_root(read_bytes(path), path, _ROOT, faults)
-    flat = _Flat(packages, faults)
-    flat.add(_system_of(root, path), "", Sources(path, inside, faults), units_in(root), Dictionaries())
+    root = read_root(read_bytes(path), path, ROOT, faults)
+    flat = Flat(packages, faults)
+    flat.add(system_of(root, path), "", Sources(path, inside, faults), units_in(root), Dictionaries())
     experiment = root.find("ssd:DefaultExperiment", NAMESPACES)
     start, stop = (
         None if experiment is None else number(experiment, attribute, path) for attribute in ("startTime", "stopTime")
@@ -147,7 +78,7 @@ def read_description(path: Path, inside: Path | None = None, packages: Packages 
     return Description(
         path,
         name=root.get("name") or path.stem,
-        description=_system_of(root, path).get("description") or root.get("description") or "",
+        description=system_of(root, path).get("description") or root.get("description") or "",
         components=tuple(flat.components),
         systems=flat.systems,
         connections=tuple(flat.connections),
@@ -167,161 +98,9 @@ def _truth(root: Any, path: Path) -> tuple[Told, ...]:
         raise DescriptionError(f"{path}, {error}") from None
 
 
-def _system_of(root: Any, path: Path) -> Any:
-    system = root.find("ssd:System", NAMESPACES)
-    if system is None:
-        raise DescriptionError(f"{path}: there is no System in it")
-    return system
-
-
 def _step(root: Any, path: Path) -> float | None:
     """The step size of an annotation, ours first."""
     for kind, name, attribute in _STEPS:
         for found in root.iterfind(f".//{{*}}Annotation[@type='{kind}']//{{*}}{name}"):
             return number(found, attribute, path)
     return None
-
-
-@dataclass
-class _Flat:
-    """Collects what is in nested systems, each thing under its full name."""
-
-    packages: Packages | None
-    faults: list[str]
-    components: list[Component] = field(default_factory=list)
-    systems: dict[str, dict[str, Connector]] = field(default_factory=dict)
-    connections: list[Connection] = field(default_factory=list)
-    values: list[tuple[int, ParameterValue]] = field(default_factory=list)  # each with the depth of its binding
-
-    def add(
-        self, system: Any, name: str, files: Sources, units: dict[str, Unit], dictionaries: Dictionaries, depth: int = 0
-    ) -> None:
-        """A system and all that is in it; name: "" for the whole."""
-        if depth > _DEEPEST:
-            raise DescriptionError(f"{files.where(system)}: systems inside systems without an end")
-        self.systems[name] = dict(connectors_of(system, files, units))
-        self._bind(system, name, files, None, depth)
-        dictionaries = dictionaries.within(system, name, files)
-        self.systems |= dictionaries.new
-        inner: dict[str, tuple[str, dict[str, Connector]]] = {}  # kind of element and its connectors, by its own name
-        for element in system.iterfind("ssd:Elements/*", NAMESPACES):
-            own = required(element, "name", files.ssd)
-            full = _joined(name, own)
-            kind = etree.QName(element).localname
-            if own in inner:
-                raise DescriptionError(f"{files.where(element)}: {own!r}: the name occurs twice; rename one of them")
-            if kind == "System":
-                self.add(element, full, files, units, dictionaries, depth + 1)
-            elif kind == "Component":
-                kind = self._component(element, full, files, units, dictionaries, depth + 1)
-            elif kind != "SignalDictionaryReference":
-                self.faults.append(f"{files.where(element)}: {kind} is no element of a system; left out")
-                continue
-            declared = dict(connectors_of(element, files, units))
-            inner[own] = kind, self.systems[full] | declared if kind == "System" else declared
-            if kind == "SignalDictionaryReference":
-                dictionaries.refer(own, required(element, "dictionary", files.ssd), files.where(element))
-        for element in system.iterfind("ssd:Connections/ssd:Connection", NAMESPACES):
-            start, end = (
-                _end(element.get(f"{side}Element", ""), required(element, f"{side}Connector", files.ssd), name,
-                     self.systems[name], inner, dictionaries)
-                for side in ("start", "end")
-            )  # fmt: skip
-            same_units = element.get("suppressUnitConversion") not in ("true", "1")
-            self.connections.append(
-                Connection(start, end, transformation_of(element, files), same_units, files.where(element))
-            )
-
-    def _bind(self, element: Any, name: str, files: Sources, component: Path | None, depth: int) -> None:
-        self.values += [(depth, value) for value in bound_values(element, name, files, component)]
-
-    def _component(
-        self, element: Any, name: str, files: Sources, units: dict[str, Unit], dictionaries: Dictionaries, depth: int
-    ) -> str:
-        """Add a component; says whether it is one, or another description and so a System."""
-        where, kind = f"{files.where(element)}: component {name!r}", element.get("type", FMU_TYPE)
-        if element.get("source") is None:
-            raise DescriptionError(f"{where} has no source: there is nothing to run; give its FMU")
-        if element.get("source").startswith("#"):
-            systems = element.getroottree().iterfind(".//ssd:System", NAMESPACES)
-            meant = next((s for s in systems if s.get("id") == element.get("source")[1:]), None)
-            if meant is None:
-                raise DescriptionError(f"{where}: no system here has the id {element.get('source')[1:]!r}")
-            self.add(meant, name, files, units, dictionaries, depth)
-            self._bind(element, name, files, None, depth)
-            return "System"
-        if _is_system(element):
-            path, fragment = files.path_and_fragment(element)
-            inside = files.inside
-            if self.packages and path.suffix.lower() == ".ssp":
-                path, inside = self.packages.structure(path, fragment)
-            root = read_root(read_bytes(path), path, _ROOT, self.faults)
-            inner = Sources(path, inside, self.faults)
-            self.add(_system_of(root, path), name, inner, units_in(root), Dictionaries(), depth)
-            self._bind(element, name, files, path, depth)
-            return "System"
-        if kind != FMU_TYPE:
-            raise DescriptionError(f"{where} is no FMU and no system, but {kind}: there is no way to run it")
-        source = files.path(element)
-        connectors = dict(connectors_of(element, files, units))
-        self.components.append(
-            Component(
-                name,
-                element.get("description", ""),
-                source,
-                connectors,
-                files.where(element),
-                element.get("implementation", "any"),
-                _treatment(element, files),
-            )
-        )
-        self._bind(element, name, files, source, depth)
-        return "Component"
-
-
-def _is_system(element: Any) -> bool:
-    """Whether a component is a description of a system, by its type or the end of its name."""
-    kind, name = element.get("type", ""), element.get("source").partition("#")[0].lower()
-    return kind in ("application/x-ssp-definition", "application/x-ssp-package") or name.endswith((".ssd", ".ssp"))
-
-
-def _treatment(element: Any, files: Sources) -> str | None:
-    """What an annotation says of how a component steps; see schedule.py."""
-    for mark in element.iterfind("ssd:Annotations/ssc:Annotation[@type='org.imufmu']/imufmu:Treat", NAMESPACES):
-        kind = required(mark, "as", files.ssd)
-        if kind not in KINDS_OF_STEP:
-            raise DescriptionError(f"{files.where(mark)}: as={kind!r}: expected {' or '.join(KINDS_OF_STEP)}")
-        return kind
-    return None
-
-
-def _joined(system: str, name: str) -> str:
-    return f"{system}.{name}" if system else name
-
-
-# Kinds of connectors through which values go into an element, and out of one.
-_INTO = ("input", "parameter")
-_OUT_OF = ("output", "calculatedParameter")
-
-
-def _end(
-    element: str,
-    connector: str,
-    system: str,
-    connectors: dict[str, Connector],
-    inner: dict[str, tuple[str, dict[str, Connector]]],
-    dictionaries: Dictionaries,
-) -> End:
-    """An end by its full name. element: its own name, "" for the system around the connection."""
-    if not element:  # seen from inside: what goes into the system comes out of its connector
-        kind = connectors[connector].kind if connector in connectors else None
-        role = "source" if kind in _INTO else "sink" if kind in _OUT_OF else "either"
-        return End(system, connector, role)
-    what, its = inner.get(element, ("Component", {}))
-    if what == "Component":
-        return End(_joined(system, element), connector, "component")
-    kind = its[connector].kind if connector in its else None
-    role = "sink" if kind in _INTO else "source" if kind in _OUT_OF else "either"
-    if what == "SignalDictionaryReference":
-        return End(dictionaries.of(element), connector, role)
-    return End(_joined(system, element), connector, role)

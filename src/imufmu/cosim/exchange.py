@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from .interface import WiringError, near, representation, unit_of
+from .interface import WiringError, near, number_of, representation, unit_of
 from .links import Link
 from .slave import DTYPES, Inlet, Outlet
 from .system import System
@@ -44,14 +44,14 @@ class Exchange:
     def _begin(self) -> None:
         """Values before the first exchange, read by the broken end of a loop: the start of the output, or the input."""
         for link in self._links:
-            start = link.target[1].start
+            start = number_of(link.target[1].start)
             if start is not None and link.factor:
                 kind, place = self._place[link.source[0], link.source[1].name]
-                self.values[kind][place] = (_number(start) - link.offset) / link.factor
+                self.values[kind][place] = (start - link.offset) / link.factor
         for kind, place in self._place.values():
-            start = self._variables[kind][place][1].start
+            start = number_of(self._variables[kind][place][1].start)
             if start is not None:
-                self.values[kind][place] = _number(start)
+                self.values[kind][place] = start
 
     def outlets(self, component: str) -> list[Outlet]:
         """What a component reads."""
@@ -110,12 +110,6 @@ class Exchange:
         """Units by ``component.variable``."""
         every = [pair for some in self._variables.values() for pair in some]
         return {f"{component}.{variable.name}": unit_of(variable) for component, variable in every}
-
-
-def _number(start: Any) -> float:
-    """A start value, which fmpy leaves as text."""
-    text = str(start).strip()
-    return float(text == "true") if text in ("true", "false") else float(text)
 
 
 def _outputs(system: System) -> list[Name]:

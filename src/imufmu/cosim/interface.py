@@ -107,6 +107,16 @@ def unit_of(variable: Any) -> str | None:
     return variable.unit or (variable.declaredType.unit if variable.declaredType else None)
 
 
+def number_of(text: Any) -> float | None:
+    """A number or truth value that fmpy leaves as text; None where there is none, or an FMU with faults has another."""
+    plain = str(text).strip()
+    try:
+        value = float(plain == "true") if plain in ("true", "false") else float(plain)
+    except ValueError:
+        return None
+    return value if math.isfinite(value) else None
+
+
 def items_of(variable: Any) -> dict[str, int]:
     """Items of an Enumeration by name; empty for any other variable."""
     declared = variable.declaredType

@@ -12,8 +12,9 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from .description import Connection, Description
+from .description import Description
 from .interface import Interface, items_of, label, representation
+from .ssp.flat import Connection
 from .ssp.transformations import UNCHANGED, Transformation
 from .units import SAME, Linear, Unit, conversion
 

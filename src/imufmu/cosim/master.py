@@ -26,6 +26,7 @@ import numpy as np
 from .apart import Instance, Instances
 from .errors import STEP_TIMEOUT, EndOfRun, SimulationError
 from .exchange import Exchange
+from .interface import number_of
 from .interrupt import Terminated, interrupt_between_calls
 from .results import Result
 from .schedule import Schedule
@@ -137,7 +138,8 @@ def _ticks(system: System, start: float | None, stop: float | None, h: float | N
     h = h if h is not None else described.step
     if h is None:
         experiments = [part.model.defaultExperiment for part in system.parts]
-        h = min((float(e.stepSize) for e in experiments if e is not None and e.stepSize), default=None)
+        preferred = [number_of(e.stepSize) for e in experiments if e is not None]
+        h = min((size for size in preferred if size), default=None)
     missing = [name for name, value in (("stop_time", stop), ("step", h)) if value is None]
     if stop is None or h is None:
         raise ValueError(f"{system.path} does not say {' and '.join(missing)}: give {' and '.join(missing)}")
@@ -155,7 +157,7 @@ def _period_notes(system: System, settings: Sequence[Setting], h: float) -> list
     notes = []
     for name, interface in system.interfaces.items():
         variable = interface.variables.get("sample_period")
-        if variable is None or variable.start is None:
+        if variable is None or number_of(variable.start) is None:
             continue
         given = [s.value for s in settings if s.component == name and s.variable.name == "sample_period"]
         period = float(given[0] if given else variable.start)

@@ -16,10 +16,10 @@ from typing import Any
 from lxml import etree
 
 from ..files.atomic import atomic_write, check_not_read
-from .description import FMU_TYPE
 from .interface import representation, unit_of
 from .settings import Setting
 from .ssp.files import NAMESPACES, DescriptionError, Sources, read_bytes, read_root
+from .ssp.flat import FMU_TYPE
 from .ssp.packages import STRUCTURE
 from .system import System
 

@@ -15,9 +15,9 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping
 
-from .description import KINDS_OF_STEP
 from .interface import Interface, WiringError
 from .order import Edge, signal_flow
+from .ssp.flat import KINDS_OF_STEP
 from .system import System
 
 _TOLD = 3  # connections of a loop told by name

@@ -20,10 +20,11 @@ from ..registry import BLOCKS
 from .arrays import one_by_one
 from .connecting.connect import connect
 from .connecting.matching import Ask
-from .description import Component, Description, DescriptionError, read_description
+from .description import Description, DescriptionError, read_description
 from .interface import Interface, WiringError
 from .links import Link, Wiring
 from .settings import Setting, bound_settings, given_settings, merged
+from .ssp.flat import Component
 from .ssp.packages import Packages
 from .wiring import find_wiring
 
@@ -56,15 +57,19 @@ class System:
     def read(path: str | Path, *, native: bool = False, strict: bool = False) -> System:
         """Read an .ssd or .ssp file, or a system of imufmu by its name.
 
+        "a.ssp#late.ssd" is another description in an archive than the usual one.
         An FMU that is not where the .ssd says, but is named after a block of imufmu, is built into the user's cache: in
         Python, or with ``native`` as compiled C. An FMU that is there is taken as it is. strict: refuse what breaks a
         standard, also where its meaning is clear. Raises DescriptionError, ArchiveError (FMU, archive or XML unfit),
         BuildError or WiringError (all misfits at once).
         """
-        path = locate(path).resolve()
+        path, variant = locate(path).resolve(), ""
+        if ".ssp#" in path.name:
+            archive, _, variant = path.name.partition("#")
+            path = path.with_name(archive)
         packages = Packages()
         try:
-            ssd, inside = packages.structure(path) if path.suffix.lower() == ".ssp" else (path, None)
+            ssd, inside = packages.structure(path, variant) if path.suffix.lower() == ".ssp" else (path, None)
             system = _read(ssd, native, strict, packages, inside)
         except BaseException as error:
             packages.delete()

@@ -55,6 +55,9 @@ class Base:
     offset: float = 0.0
 
 
+_EMPTY = Base((0.0,) * len(BASES))
+
+
 @dataclass(frozen=True)
 class Unit:
     """A unit by name. base: as its file defines it; None where the file only names it."""
@@ -86,8 +89,11 @@ SAME = Linear()
 
 def defined(name: str, attributes: Mapping[str, Any], relative: bool = False) -> Unit:
     """Unit of a file from the attributes of its element BaseUnit. relative: differences, where an offset cancels."""
-    exponents = tuple(float(attributes.get(base) or 0) for base in BASES)
-    factor, offset = float(attributes.get("factor") or 1), float(attributes.get("offset") or 0)
+    try:
+        exponents = tuple(float(attributes.get(base) or 0) for base in BASES)
+        factor, offset = float(attributes.get("factor") or 1), float(attributes.get("offset") or 0)
+    except ValueError:
+        return Unit(name)
     if not (math.isfinite(factor) and math.isfinite(offset) and factor):
         return Unit(name)
     return Unit(name, Base(exponents, factor, 0.0 if relative else offset))
@@ -103,7 +109,7 @@ def conversion(source: Unit | None, target: Unit | None) -> Linear:
     if source.name == target.name and (source.base is None or target.base is None):
         return SAME
     a, b = _base(source), _base(target)
-    if source.name == target.name and a and b and a.exponents == b.exponents:
+    if source.name == target.name and a and b and a.exponents[:_RAD] == b.exponents[:_RAD]:
         return SAME
     for unit, base in ((source, a), (target, b)):
         if base is None:
@@ -140,11 +146,14 @@ def _base(unit: Unit) -> Base | None:
     """What the unit is: by its file, else by its name.
 
     Some files leave the radian out of rad/s or deg/s. It is put back where the name says so: without it rad/s and Hz,
-    which differ by 2 pi, are the same. Roots, which no file can define, are read from the name, too.
+    which differ by 2 pi, are the same. An empty definition, as of roots, which no file can define, gives way to a name
+    that means more.
     """
     base = unit.base
-    if base is None or (not any(base.exponents) and re.search(r"sqrt|√|0\.5", unit.name)):
+    if base is None:
         return _read(unit.name)
+    if base == _EMPTY and re.search(r"rad|deg|°|sqrt|√|/|[A-Za-z]\^?-?\d", unit.name):  # and no "pu" or "dozen"
+        return _read(unit.name) or base
     if base.exponents[_RAD] == 0 and re.search(r"rad|deg|rpm|rev|turn|°", unit.name):
         read = _read(unit.name)
         if read and read.exponents[:_RAD] == base.exponents[:_RAD]:

@@ -6,9 +6,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from .description import Component, Connection, Description, End
+from .description import Description
 from .interface import Interface, label, near, representation, unit_of
 from .links import Node, Wiring
+from .ssp.flat import Component, Connection, End
 from .units import UnitError
 
 # Causalities of variables that can feed, and that can be fed. A local variable is no output, but can be read as one.

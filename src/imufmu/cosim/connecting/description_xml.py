@@ -11,8 +11,9 @@ from urllib.parse import quote
 
 from lxml import etree
 
-from ..description import FMU_TYPE, NAMESPACES
 from ..devices import DeviceValue
+from ..ssp.files import NAMESPACES
+from ..ssp.flat import FMU_TYPE
 from ..truth import Told
 
 _ANNOTATION = "org.imufmu"

@@ -20,9 +20,6 @@ _KINDS = {
     "unspecified": "inout",
 }
 _ONLY_TOLD = ("MetaData", "Signature", "Dimension")  # who made and signed it; how large arrays are, as FMUs tell, too
-_LACKING = {
-    "Clock": "a clock; only values are exchanged",
-}
 _INDICES = ("startIndices", "endIndices")
 
 
@@ -54,7 +51,6 @@ def lower(root: Any, path: Path, faults: list[str]) -> None:
             is_lost(element, "elements of an array; connect x[1] and its like one by one")
         elif name in _ONLY_TOLD:
             parent.remove(element)
-        elif name in _LACKING:
-            if etree.QName(parent).localname != "Parameter":  # the values of a parameter tell how many there are
-                is_lost(element, f"{name} of {parent.get('name')!r}: {_LACKING[name]}")
+        elif name == "Clock":
+            is_lost(element, f"Clock of {parent.get('name')!r}: a clock; only values are exchanged")
             parent.remove(element)
