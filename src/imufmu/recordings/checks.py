@@ -38,6 +38,8 @@ def axes_doubts(recording: Recording) -> list[str]:
             "accel does not turn as gyro and mag say: its axes are not theirs; it fits as --columns "
             f"accel={columns_told(matrix, _names(recording, 'accel'))}, or with every sign turned"
         ]
+    if not by_gravity.fits and field_fits:  # no sign of the accelerometer does that: it is motion
+        return []
     if not by_gravity.fits:
         return [told(by_gravity, _names(recording, "gyro"))]
     if gravity_fits and not by_field.fits and by_field.scale != 1:
