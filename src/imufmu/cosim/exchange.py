@@ -12,6 +12,7 @@ from .links import Link
 from .slave import DTYPES, Inlet, Outlet
 from .system import System
 
+_WHOLE = np.iinfo(DTYPES["Integer"]).min, np.iinfo(DTYPES["Integer"]).max
 Name = tuple[str, str]  # component, variable
 
 
@@ -51,7 +52,8 @@ class Exchange:
         for kind, place in self._place.values():
             start = self._variables[kind][place][1].start
             if start is not None:
-                self.values[kind][place] = _number(start)
+                number = _number(start)
+                self.values[kind][place] = np.clip(number, *_WHOLE) if kind == "Integer" else number
 
     def outlets(self, component: str) -> list[Outlet]:
         """What a component reads."""
