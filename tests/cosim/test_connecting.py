@@ -287,6 +287,13 @@ def test_a_platform_of_any_kind_is_estimated_and_compared(kind: str, mapping: di
     assert ("heading_rmse_deg" in compared.summary) == (mapping is not None)
 
 
+def test_a_local_variable_is_taken_where_the_user_names_it() -> None:
+    system = System.connect(rocker("3_cs"), "ideal", ["plumb"], {"roll": "angle", "pitch": "small"})
+    result = imufmu.simulate(system, stop_time=1.0, in_process=True)
+    np.testing.assert_allclose(result["truth.roll"], result["plant.angle"], rtol=0, atol=1e-15)  # one rounding each way
+    assert not [line for line in connect(rocker("3_cs")).found if "angle" in line]
+
+
 def test_a_description_in_another_folder_finds_its_plant(tmp_path: Path) -> None:
     for name in ("a b", "c"):
         (tmp_path / name).mkdir()

@@ -83,7 +83,7 @@ def connect(
     given = _known_names({ALIASES.get(key, key): text for key, text in (mapping or {}).items()})
     result = Connected(name=path.stem, notes=faults)
     problems: list[str] = []
-    outputs = _matcher(path.name, model, "output")
+    outputs = _matcher(path.name, model, "output", "local")
     device = {} if str(imu) == NO_IMU else device_values(imu)
     period = 1.0 / rate if rate else float(device["sample_period"].text) if "sample_period" in device else _PERIOD
     read = _readings(outputs, given, ask, problems, result)
@@ -122,10 +122,12 @@ def _known_names(given: dict[str, str]) -> dict[str, str]:
     return given
 
 
-def _matcher(where: str, model: Any, causality: str) -> Matcher:
+def _matcher(where: str, model: Any, causality: str, also: str = "") -> Matcher:
+    """What variables of a causality can be; those of another one only where the user names them."""
     interface = Interface.of_model(where, model)
-    variables = interface.of(causality)
-    return Matcher(where, variables, {v.name: interface.unit(v) for v in variables})
+    variables = interface.of(causality, also)
+    found = [v.name for v in variables if v.causality == causality]
+    return Matcher(where, variables, {v.name: interface.unit(v) for v in variables}, found)
 
 
 def _readings(
