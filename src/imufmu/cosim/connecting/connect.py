@@ -175,7 +175,7 @@ def _through_imu(
     readings = {}
     for quantity, (component, choice) in sources.items():
         ideal, reading = _SENSORS[quantity]
-        _wire(result, component, choice, IMU, ideal.element_names(), ideal.unit)
+        _wire(result, component, choice, IMU, ideal.element_names())
         readings[quantity] = (IMU, _exact(quantity, reading))
     return readings
 
@@ -184,9 +184,9 @@ def _exact(quantity: str, signal: Signal) -> Choice:
     return Choice(quantity, tuple(signal.element_names()), (1.0,) * signal.size, signal.unit)
 
 
-def _wire(result: Connected, source: str, choice: Choice, target: str, names: Sequence[str], unit: str | None) -> None:
+def _wire(result: Connected, source: str, choice: Choice, target: str, names: Sequence[str]) -> None:
     for variable, factor, name in zip(choice.variables, choice.factors, names, strict=True):
-        result._wires.append(Wire(source, variable, choice.unit, target, name, unit, factor))
+        result._wires.append(Wire(source, variable, target, name, factor))
 
 
 def _add_estimator(
@@ -200,7 +200,7 @@ def _add_estimator(
     """An estimator behind the readings."""
     taken = {part.name for part in result._parts} | {COMPONENT}
     name = _free_name(Path(estimator).stem.replace(".", "_"), taken)
-    inputs: dict[str, tuple[Sequence[str], str | None, tuple[float, ...]]] = {}
+    inputs: dict[str, tuple[Sequence[str], tuple[float, ...]]] = {}
     if Path(estimator).suffix.lower() == ".fmu":
         path, model = Path(estimator).resolve(), read_fmu(Path(estimator), result.notes)
         matcher = _matcher(Path(estimator).name, model, "input")
@@ -208,11 +208,11 @@ def _add_estimator(
             text = given.get(f"{name}.{quantity}") or given.get(f"{name}.{short(quantity)}")
             choice = _given(matcher, quantity, text, problems) if text else matcher.find(READ[quantity], None)[0]
             if choice:
-                inputs[quantity] = choice.variables, choice.unit, choice.factors
+                inputs[quantity] = choice.variables, choice.factors
         has_period = any(v.name == "sample_period" and v.causality == "parameter" for v in model.modelVariables)
         if SPEED.name in sources and any(v.name == SPEED.name and v.causality == "input" for v in model.modelVariables):
             choice = matcher.given(SPEED, SPEED.name)
-            inputs[SPEED.name] = choice.variables, choice.unit, choice.factors
+            inputs[SPEED.name] = choice.variables, choice.factors
         lacking = [short(quantity) for quantity in READ if quantity not in inputs and quantity != "magnetic_field"]
         if lacking:
             problems.append(
@@ -227,9 +227,9 @@ def _add_estimator(
         signals = {signal.name: signal for signal in BLOCKS[str(estimator)].inputs}
         for quantity, (_, reading) in _SENSORS.items():
             if reading.name in signals:
-                inputs[quantity] = reading.element_names(), reading.unit, (1.0,) * reading.size
+                inputs[quantity] = reading.element_names(), (1.0,) * reading.size
         if SPEED.name in signals:
-            inputs[SPEED.name] = [SPEED.name], SPEED.unit, (1.0,)
+            inputs[SPEED.name] = [SPEED.name], (1.0,)
         if not {"angular_velocity", "specific_force"} <= inputs.keys():
             problems.append(
                 f"{estimator} takes {', '.join(signals)}: not the readings of one IMU; describe it in an .ssd"
@@ -238,12 +238,12 @@ def _add_estimator(
     if SPEED.name in sources and SPEED.name in inputs:
         values[f"{SPEED.name}_valid"] = DeviceValue("Real", "1", None)
     result._parts.append(Part(name, path, values))
-    for quantity, (names, unit, factors) in inputs.items():
+    for quantity, (names, factors) in inputs.items():
         if quantity in sources:
             source, choice = sources[quantity]
             # A factor of an input is from its unit to ours: the way back.
             back = tuple(a / b for a, b in zip(choice.factors, factors, strict=True))
-            _wire(result, source, Choice(quantity, choice.variables, back, choice.unit), name, names, unit)
+            _wire(result, source, Choice(quantity, choice.variables, back, choice.unit), name, names)
 
 
 def _free_name(wanted: str, taken: set[str]) -> str:

@@ -149,13 +149,15 @@ class Matcher:
                 f"{short(quantity.name)}={text}: {fault}; {self.where} has {', '.join(self._names) or 'none'}"
             )
         said += [order] if order in ORDERS else []
-        own = Unit(units[-1]) if units else self._units.get(elements[0])
+        own = [Unit(units[-1]) if units else self._units.get(element) for element in elements]
         try:
-            factor = conversion(own, Unit(quantity.unit)).factor
+            factors = [conversion(unit, Unit(quantity.unit)).factor for unit in own]
         except UnitError as error:
             raise ValueError(f"{short(quantity.name)}={text}: {error}") from None
         form = _checked_form(quantity, text, said)
-        return Choice(quantity.name, elements, tuple(sign * factor for sign in signs), own.name if own else None, form)
+        signed = tuple(sign * factor for sign, factor in zip(signs, factors, strict=True))
+        named = ", ".join(dict.fromkeys(unit.name for unit in own if unit)) or None
+        return Choice(quantity.name, elements, signed, named, form)
 
     def there_is(self, size: int) -> str:
         """Vectors of a size, for messages."""
