@@ -32,9 +32,11 @@ _SENSORS |= {"magnetic_field": (MAGNETIC_FIELD, MAG)}
 class Connected:
     """A description to be written, and what a user should know of it.
 
-    found: what was taken for what. compared: what errors can be computed. notes: what was left out or assumed.
+    name: of the system. found: what was taken for what. compared: what errors can be computed. notes: what was left out
+    or assumed.
     """
 
+    name: str
     found: list[str] = field(default_factory=list)
     compared: str = ""
     notes: list[str] = field(default_factory=list)
@@ -42,7 +44,6 @@ class Connected:
     _wires: list[Wire] = field(default_factory=list)
     _truth: tuple[Told, ...] = ()
     _times: tuple[float, float, float] = (0.0, _STOP, _PERIOD)
-    name: str = ""
 
     @property
     def lines(self) -> list[str]:
@@ -81,7 +82,7 @@ def connect(
     faults: list[str] = []
     model = read_fmu(path, faults)
     given = _known_names({ALIASES.get(key, key): text for key, text in (mapping or {}).items()})
-    result = Connected(name=path.stem, notes=faults)
+    result = Connected(path.stem, notes=faults)
     problems: list[str] = []
     outputs = _matcher(path.name, model, "output", "local")
     device = {} if str(imu) == NO_IMU else device_values(imu)
