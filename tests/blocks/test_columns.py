@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from imufmu import Result, lee2012, run
+from imufmu import Replay, Result, lee2012, read_recording, run
 from imufmu.blocks.running import Trajectory
+from imufmu.files.csv_table import write_csv
 from support.optional import needs
 
 
@@ -100,6 +102,23 @@ def test_a_missing_package_is_told_in_one_sentence(
     monkeypatch.setitem(sys.modules, package, None)  # as if it were not installed
     with pytest.raises(ImportError, match=rf'to_{package} needs {package}, .*: pip install "imufmu\[notebook\]"'):
         getattr(trajectory, f"to_{package}")()
+
+
+@needs("pandas")
+def test_a_replay_is_a_table_too(tmp_path: Path) -> None:
+    """Over the rows of its recording, which need not begin at 0."""
+    time = 7.0 + np.arange(50) * 0.01
+    write_csv(tmp_path / "walk.csv", {"time": time, "gyro": np.zeros((50, 3)), "accel": np.tile([0, 0, 9.8], (50, 1))})
+    recording = read_recording(tmp_path / "walk.csv")
+    columns = {"roll": np.arange(50.0), **{f"vertical[{i}]": np.full(50, i) for i in (1, 2, 3)}}
+    replayed = Replay(recording, "lee2012", columns, {name: "rad" if name == "roll" else "1" for name in columns}, ())
+    frame = replayed.to_pandas()
+    assert frame.index.tolist() == recording.time.tolist()
+    assert frame.attrs["units"]["roll"] == "rad"
+    assert [line.get_label() for line in replayed.plot("vertical").axes[0].lines] == [
+        f"vertical[{i}]" for i in (1, 2, 3)
+    ]
+    assert "<table>" in replayed._repr_html_()
 
 
 def test_a_run_of_a_block_knows_its_units() -> None:

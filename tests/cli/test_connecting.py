@@ -29,9 +29,10 @@ def test_connect_says_what_it_found_and_writes_a_system_that_runs(imufmu, tmp_pa
     assert "no magnetic field in the plant" in errors
     assert not list(tmp_path.glob("*.ssd"))
     assert imufmu(*arguments, "--map", ATTITUDE, "--out", "my.ssd", "--stop", 1)[0] == 0
-    code, table, _ = imufmu("run", "my.ssd", "--in-process", "--output", "r.csv")
+    code, table, _ = imufmu("run", "my.ssd", "--in-process", "--output", "r.csv", "--report", "r.html")
     assert code == 0
     assert re.search(r"^plumb .*\n.*lee2012|^lee2012 ", table, re.MULTILINE)
+    assert "plumb" in (tmp_path / "r.html").read_text(encoding="utf-8")  # and no Binary output is in its way
     header, *rows = (tmp_path / "r.csv").read_text().splitlines()
     assert "truth.q_NS[1]" in header and len(rows) == 101
     assert imufmu(*arguments[:2], "--out", "my.txt")[0] == 2

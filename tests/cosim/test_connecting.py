@@ -104,6 +104,16 @@ def test_units_of_the_plant_are_converted_in_the_description(tmp_path: Path) -> 
     assert read_description(path).truth[0].factors[0] == pytest.approx(np.pi / 180, rel=1e-15)
 
 
+def test_the_user_knows_a_unit_better_than_an_fmu(tmp_path: Path) -> None:
+    """The FMU says rad/s; the description converts once, from what the user says."""
+    mapping = {"gyro": "omega:deg/s", "accel": "f,specific_force[2],-specific_force[3]"}
+    system = System.connect(plant(tmp_path, RATES | FORCES | {"f": "g"}), "ideal", ["plumb"], mapping)
+    factors = {link.target[1].name: link.factor for link in system.links if link.target[0] == "imu"}
+    assert factors["angular_velocity[3]"] == pytest.approx(np.pi / 180, rel=1e-15)
+    assert factors["specific_force[1]"] == pytest.approx(9.80665, rel=1e-15)  # each element from its own unit
+    assert (factors["specific_force[2]"], factors["specific_force[3]"]) == (1.0, -1.0)
+
+
 @pytest.mark.parametrize(
     ("outputs", "message"),
     [
@@ -285,6 +295,13 @@ def test_a_platform_of_any_kind_is_estimated_and_compared(kind: str, mapping: di
     assert compared.component == "plumb"
     assert compared.summary["tilt_rmse_deg"] < 0.5  # of plumb with an ideal IMU, from the first sample on
     assert ("heading_rmse_deg" in compared.summary) == (mapping is not None)
+
+
+def test_a_local_variable_is_taken_where_the_user_names_it() -> None:
+    system = System.connect(rocker("3_cs"), "ideal", ["plumb"], {"roll": "angle", "pitch": "small"})
+    result = imufmu.simulate(system, stop_time=1.0, in_process=True)
+    np.testing.assert_allclose(result["truth.roll"], result["plant.angle"], rtol=0, atol=1e-15)  # one rounding each way
+    assert not [line for line in connect(rocker("3_cs")).found if "angle" in line]
 
 
 def test_a_description_in_another_folder_finds_its_plant(tmp_path: Path) -> None:

@@ -168,7 +168,6 @@ def test_numbers_of_every_type_arrive_as_they_are(in_process: bool, tmp_path: Pa
 @pytest.mark.parametrize(
     ("parameter", "value", "message"),
     [
-        ("hits_before", 2**40, r"^plant\.hits = 1099511627776: beyond what int32 holds, -2147483648 to 2147483647"),
         ("steps_before", 300, r"^plant\.steps_before = 300: beyond what uint8 holds, 0 to 255"),
         ("hits_before", 2**70, r"^plant: hits_before = \d+: beyond -9223372036854775808 to"),
     ],
@@ -176,6 +175,27 @@ def test_numbers_of_every_type_arrive_as_they_are(in_process: bool, tmp_path: Pa
 def test_a_whole_number_that_does_not_fit_is_refused(parameter: str, value: int, message: str, tmp_path: Path) -> None:
     with pytest.raises(SimulationError, match=message):
         rocked("3_cs", tmp_path, **{parameter: value})
+
+
+@pytest.mark.parametrize("in_process", [True, False], ids=["here", "apart"])
+def test_a_whole_number_of_more_than_32_bits_is_told_and_stops_a_run_only_where_it_feeds_something(
+    in_process: bool, tmp_path: Path
+) -> None:
+    told = r"hits = 1099511627776: beyond what int32 holds, -2147483648 to 2147483647"
+    result = rocked("3_cs", tmp_path, in_process=in_process, stop=0.1, hits_before=2**40)
+    assert set(result["plant.hits"].tolist()) == {2**31 - 1}
+    assert f"plant: {told}; recorded as the nearest of these" in result.notes
+    components = {"plant": rocker("3_cs"), "end": stub("sampler")}
+    system = write_ssd(tmp_path / "s.ssd", components, ["plant.hits -> end.n"], step=H)
+    with pytest.raises(SimulationError, match=rf"^plant\.{told}"):
+        imufmu.simulate(system, stop_time=0.1, parameters={"plant.hits_before": 2**40}, in_process=in_process)
+
+
+def test_a_start_of_more_than_32_bits_is_no_fault(tmp_path: Path) -> None:
+    old = '<Int64 name="hits" valueReference="100" causality="output"/>'
+    path = changed(tmp_path, (old, old.replace("/>", ' initial="exact" start="9876543210"/>')))
+    system = write_ssd(tmp_path / "s.ssd", {"plant": path}, step=H)
+    assert imufmu.simulate(system, stop_time=0.1, in_process=True)["plant.hits"][-1] == 0
 
 
 def test_what_carries_no_number_cannot_be_connected(tmp_path: Path) -> None:

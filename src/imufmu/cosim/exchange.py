@@ -12,19 +12,21 @@ from .links import Link
 from .slave import DTYPES, Inlet, Outlet
 from .system import System
 
+_WHOLE = np.iinfo(DTYPES["Integer"]).min, np.iinfo(DTYPES["Integer"]).max
 Name = tuple[str, str]  # component, variable
 
 
 class Exchange:
     """Values that the components of a system read, exchange and record.
 
-    record: names of variables, or of vectors without brackets, that the result shall have; None: every output. Raises
-    WiringError for a name that the system does not have.
+    record: names of variables, or of vectors without brackets, that the result shall have; None: every output. also:
+    names that it shall have in any case. Raises WiringError for a name that the system does not have.
     """
 
-    def __init__(self, system: System, record: Sequence[str] | None) -> None:
+    def __init__(self, system: System, record: Sequence[str] | None, also: Sequence[str] = ()) -> None:
         self._links = system.links
-        self._recorded = _outputs(system) if record is None else _requested(system, record)
+        recorded = _outputs(system) if record is None else _requested(system, record)
+        self._recorded = list(dict.fromkeys([*recorded, *_requested(system, also)]))
         needed = set(self._recorded) | {(link.source[0], link.source[1].name) for link in system.links}
         self._variables: dict[str, list[tuple[str, Any]]] = {kind: [] for kind in DTYPES}
         for name, interface in system.interfaces.items():
@@ -51,7 +53,7 @@ class Exchange:
         for kind, place in self._place.values():
             start = number_of(self._variables[kind][place][1].start)
             if start is not None:
-                self.values[kind][place] = start
+                self.values[kind][place] = np.clip(start, *_WHOLE) if kind == "Integer" else start
 
     def outlets(self, component: str) -> list[Outlet]:
         """What a component reads."""

@@ -94,9 +94,7 @@ def simulate(
     settings = system.settings_with(parameters or {})
     ticks = _ticks(system, start_time, stop_time, step)
     told = system.description.truth
-    exchange = Exchange(
-        system, record if record is None or not told else [*record, *(v for t in told for v in t.variables)]
-    )
+    exchange = Exchange(system, record, [variable for one in told for variable in one.variables])
     schedule = Schedule(system, jacobi, treat or {})
     notes = [*system.notes, *_period_notes(system, settings, ticks.h), *schedule.notes]
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from ctypes import POINTER, byref, c_bool, c_char_p, c_double
 from functools import partial
 from itertools import groupby
@@ -12,7 +12,7 @@ import numpy as np
 from fmpy.fmi3 import FMU3Slave
 
 from .errors import EndOfRun, SimulationError
-from .slave import CALLS, DTYPES, GOOD, KINDS, WIRES, Call, Slave, references, when
+from .slave import CALLS, DTYPES, GOOD, KINDS, WIRES, Call, Inlet, Outlet, Slave, references, when
 from .unpacked import Unpacked
 
 if TYPE_CHECKING:
@@ -32,7 +32,17 @@ class Slave3(Slave):
         def log(_environment: Any, status: int, _category: bytes, message: bytes) -> None:
             self.messages.add(status, (message or b"").decode(errors="replace").strip())
 
+        self._feeding: set[str] = set()  # names of variables that feed something
         self._fmu.instantiate(loggingOn=True, logMessage=log)
+
+    def connect(
+        self, outlets: Sequence[Outlet], inlets: Sequence[Inlet], buffers: Sequence[np.ndarray] | None = None
+    ) -> None:
+        """As ``Slave.connect``."""
+        for outlet in outlets:
+            needed = range(len(outlet.variables)) if outlet.needed is None else outlet.needed
+            self._feeding |= {outlet.variables[i].name for i in needed}
+        super().connect(outlets, inlets, buffers)
 
     def _prepare_step(self, fmu: Unpacked) -> None:
         step = self._function("fmi3DoStep")
@@ -97,7 +107,7 @@ class Slave3(Slave):
     def _get(self, get: Callable[[], int], arrays: _Arrays, values: np.ndarray, at: np.ndarray) -> int:
         status = get()
         if status in GOOD:
-            values[at] = self._fitting(arrays, arrays.buffer[arrays.places], values.dtype)
+            values[at] = self._fitting(arrays, arrays.buffer[arrays.places], values.dtype, self._feeding)
         return status
 
     def _set(
@@ -111,18 +121,24 @@ class Slave3(Slave):
         arrays.buffer[arrays.places] = self._fitting(arrays, values[at], arrays.buffer.dtype)
         return put()
 
-    def _fitting(self, arrays: _Arrays, values: np.ndarray, wanted: Any) -> np.ndarray:
-        """The values, every one of which the wanted type of integer can hold. Raises SimulationError."""
-        if wanted.kind in "iu" and values.dtype.kind in "iu" and not np.can_cast(values.dtype, wanted):
-            limits = np.iinfo(wanted)
-            beyond = np.flatnonzero((values < limits.min) | (values > limits.max))
-            if beyond.size:
-                name = arrays.variables[beyond[0]].name
-                raise SimulationError(
-                    f"{self.name}.{name} = {values[beyond[0]]}: beyond what {wanted.name} holds, "
-                    f"{limits.min} to {limits.max}"
-                )
-        return values
+    def _fitting(
+        self, arrays: _Arrays, values: np.ndarray, wanted: Any, feeding: Collection[str] | None = None
+    ) -> np.ndarray:
+        """The values, every one of which the wanted type of integer can hold.
+
+        feeding: names of those that must fit; the nearest that fits stands for any other, with a remark. None: all.
+        Raises SimulationError.
+        """
+        if not (wanted.kind in "iu" and values.dtype.kind in "iu") or np.can_cast(values.dtype, wanted):
+            return values
+        limits = np.iinfo(wanted)
+        for i in np.flatnonzero((values < limits.min) | (values > limits.max)).tolist():
+            name = arrays.variables[i].name
+            told = f"{name} = {values[i]}: beyond what {wanted.name} holds, {limits.min} to {limits.max}"
+            if feeding is None or name in feeding:
+                raise SimulationError(f"{self.name}.{told}")
+            self._odd.setdefault(name, f"{told}; recorded as the nearest of these")
+        return np.clip(values, limits.min, limits.max)
 
 
 class _Arrays:

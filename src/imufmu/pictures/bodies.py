@@ -8,7 +8,9 @@ from functools import cached_property
 import numpy as np
 
 from ..blocks.rotations import matrix_from_quaternion, over_rows
+from ..cosim.interface import representation
 from ..cosim.results import Result
+from ..cosim.slave import DTYPES
 from ..cosim.system import System
 from ..scoring.systems import knowing
 
@@ -81,5 +83,6 @@ def recorded(system: System) -> list[str]:
         f"{name}.{variable.name}"
         for name, interface in system.interfaces.items()
         for variable in interface.variables.values()
-        if variable.type != "String" and (variable.causality == "output" or variable.name.startswith("skeleton["))
+        if representation(variable) in DTYPES
+        and (variable.causality == "output" or variable.name.startswith("skeleton["))
     ]

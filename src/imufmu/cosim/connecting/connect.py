@@ -32,9 +32,11 @@ _SENSORS |= {"magnetic_field": (MAGNETIC_FIELD, MAG)}
 class Connected:
     """A description to be written, and what a user should know of it.
 
-    found: what was taken for what. compared: what errors can be computed. notes: what was left out or assumed.
+    name: of the system. found: what was taken for what. compared: what errors can be computed. notes: what was left out
+    or assumed.
     """
 
+    name: str
     found: list[str] = field(default_factory=list)
     compared: str = ""
     notes: list[str] = field(default_factory=list)
@@ -42,7 +44,6 @@ class Connected:
     _wires: list[Wire] = field(default_factory=list)
     _truth: tuple[Told, ...] = ()
     _times: tuple[float, float, float] = (0.0, _STOP, _PERIOD)
-    name: str = ""
 
     @property
     def lines(self) -> list[str]:
@@ -81,9 +82,9 @@ def connect(
     faults: list[str] = []
     model = read_fmu(path, faults)
     given = _known_names({ALIASES.get(key, key): text for key, text in (mapping or {}).items()})
-    result = Connected(name=path.stem, notes=faults)
+    result = Connected(path.stem, notes=faults)
     problems: list[str] = []
-    outputs = _matcher(path.name, model, "output")
+    outputs = _matcher(path.name, model, "output", "local")
     device = {} if str(imu) == NO_IMU else device_values(imu)
     period = 1.0 / rate if rate else float(device["sample_period"].text) if "sample_period" in device else _PERIOD
     read = _readings(outputs, given, ask, problems, result)
@@ -122,10 +123,12 @@ def _known_names(given: dict[str, str]) -> dict[str, str]:
     return given
 
 
-def _matcher(where: str, model: Any, causality: str) -> Matcher:
+def _matcher(where: str, model: Any, causality: str, also: str = "") -> Matcher:
+    """What variables of a causality can be; those of another one only where the user names them."""
     interface = Interface.of_model(where, model)
-    variables = interface.of(causality)
-    return Matcher(where, variables, {v.name: interface.unit(v) for v in variables})
+    variables = interface.of(causality, also)
+    found = [v.name for v in variables if v.causality == causality]
+    return Matcher(where, variables, {v.name: interface.unit(v) for v in variables}, found)
 
 
 def _readings(
@@ -173,7 +176,7 @@ def _through_imu(
     readings = {}
     for quantity, (component, choice) in sources.items():
         ideal, reading = _SENSORS[quantity]
-        _wire(result, component, choice, IMU, ideal.element_names(), ideal.unit)
+        _wire(result, component, choice, IMU, ideal.element_names())
         readings[quantity] = (IMU, _exact(quantity, reading))
     return readings
 
@@ -182,9 +185,9 @@ def _exact(quantity: str, signal: Signal) -> Choice:
     return Choice(quantity, tuple(signal.element_names()), (1.0,) * signal.size, signal.unit)
 
 
-def _wire(result: Connected, source: str, choice: Choice, target: str, names: Sequence[str], unit: str | None) -> None:
+def _wire(result: Connected, source: str, choice: Choice, target: str, names: Sequence[str]) -> None:
     for variable, factor, name in zip(choice.variables, choice.factors, names, strict=True):
-        result._wires.append(Wire(source, variable, choice.unit, target, name, unit, factor))
+        result._wires.append(Wire(source, variable, target, name, factor))
 
 
 def _add_estimator(
@@ -198,7 +201,7 @@ def _add_estimator(
     """An estimator behind the readings."""
     taken = {part.name for part in result._parts} | {COMPONENT}
     name = _free_name(Path(estimator).stem.replace(".", "_"), taken)
-    inputs: dict[str, tuple[Sequence[str], str | None, tuple[float, ...]]] = {}
+    inputs: dict[str, tuple[Sequence[str], tuple[float, ...]]] = {}
     if Path(estimator).suffix.lower() == ".fmu":
         path, model = Path(estimator).resolve(), read_fmu(Path(estimator), result.notes)
         matcher = _matcher(Path(estimator).name, model, "input")
@@ -206,11 +209,11 @@ def _add_estimator(
             text = given.get(f"{name}.{quantity}") or given.get(f"{name}.{short(quantity)}")
             choice = _given(matcher, quantity, text, problems) if text else matcher.find(READ[quantity], None)[0]
             if choice:
-                inputs[quantity] = choice.variables, choice.unit, choice.factors
+                inputs[quantity] = choice.variables, choice.factors
         has_period = any(v.name == "sample_period" and v.causality == "parameter" for v in model.modelVariables)
         if SPEED.name in sources and any(v.name == SPEED.name and v.causality == "input" for v in model.modelVariables):
             choice = matcher.given(SPEED, SPEED.name)
-            inputs[SPEED.name] = choice.variables, choice.unit, choice.factors
+            inputs[SPEED.name] = choice.variables, choice.factors
         lacking = [short(quantity) for quantity in READ if quantity not in inputs and quantity != "magnetic_field"]
         if lacking:
             problems.append(
@@ -225,9 +228,9 @@ def _add_estimator(
         signals = {signal.name: signal for signal in BLOCKS[str(estimator)].inputs}
         for quantity, (_, reading) in _SENSORS.items():
             if reading.name in signals:
-                inputs[quantity] = reading.element_names(), reading.unit, (1.0,) * reading.size
+                inputs[quantity] = reading.element_names(), (1.0,) * reading.size
         if SPEED.name in signals:
-            inputs[SPEED.name] = [SPEED.name], SPEED.unit, (1.0,)
+            inputs[SPEED.name] = [SPEED.name], (1.0,)
         if not {"angular_velocity", "specific_force"} <= inputs.keys():
             problems.append(
                 f"{estimator} takes {', '.join(signals)}: not the readings of one IMU; describe it in an .ssd"
@@ -236,12 +239,12 @@ def _add_estimator(
     if SPEED.name in sources and SPEED.name in inputs:
         values[f"{SPEED.name}_valid"] = DeviceValue("Real", "1", None)
     result._parts.append(Part(name, path, values))
-    for quantity, (names, unit, factors) in inputs.items():
+    for quantity, (names, factors) in inputs.items():
         if quantity in sources:
             source, choice = sources[quantity]
             # A factor of an input is from its unit to ours: the way back.
             back = tuple(a / b for a, b in zip(choice.factors, factors, strict=True))
-            _wire(result, source, Choice(quantity, choice.variables, back, choice.unit), name, names, unit)
+            _wire(result, source, Choice(quantity, choice.variables, back, choice.unit), name, names)
 
 
 def _free_name(wanted: str, taken: set[str]) -> str:

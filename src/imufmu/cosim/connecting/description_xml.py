@@ -31,14 +31,12 @@ class Part:
 
 @dataclass(frozen=True)
 class Wire:
-    """input = factor * output; the units are those that the two name, None where they name none."""
+    """input = factor * output, in the units of the two FMUs."""
 
     source: str
     output: str
-    output_unit: str | None
     target: str
     input: str
-    input_unit: str | None
     factor: float
 
 
@@ -78,16 +76,16 @@ def written(
 
 
 def _component(elements: Any, part: Part, wires: Iterable[Wire], folder: Path) -> None:
-    ends = [("input", w.input, w.input_unit) for w in wires if w.target == part.name]
-    ends += [("output", w.output, w.output_unit) for w in wires if w.source == part.name]
+    ends = [("input", wire.input) for wire in wires if wire.target == part.name]
+    ends += [("output", wire.output) for wire in wires if wire.source == part.name]
     attributes = {"name": part.name, "source": _address(part.source, folder), "type": FMU_TYPE}
     attributes |= {"description": part.description} if part.description else {}
     component = etree.SubElement(elements, _name("ssd:Component"), attributes)
     if ends:
         connectors = etree.SubElement(component, _name("ssd:Connectors"))
-        for kind, name, unit in dict.fromkeys(ends):
+        for kind, name in dict.fromkeys(ends):
             connector = etree.SubElement(connectors, _name("ssd:Connector"), name=name, kind=kind)
-            etree.SubElement(connector, _name("ssc:Real"), {"unit": unit} if unit else {})
+            etree.SubElement(connector, _name("ssc:Real"))  # its unit is the FMU's, or what the user knows better
     if part.values:
         bindings = etree.SubElement(component, _name("ssd:ParameterBindings"))
         binding = etree.SubElement(bindings, _name("ssd:ParameterBinding"))

@@ -7,7 +7,7 @@ the user is asked, or has to say. See ``Choice``.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -84,13 +84,19 @@ class Choice:
 
 
 class Matcher:
-    """The Real variables of an FMU, and what they can be. units: as the FMU defines them, by variable."""
+    """The Real variables of an FMU, and what they can be.
 
-    def __init__(self, where: str, variables: Iterable[Any], units: Mapping[str, Unit | None]) -> None:
+    units: as the FMU defines them, by variable. found: names of those that need not be named by the user.
+    """
+
+    def __init__(
+        self, where: str, variables: Iterable[Any], units: Mapping[str, Unit | None], found: Collection[str]
+    ) -> None:
         self.where = where
         self._names = [v.name for v in variables if v.type == "Real"]
         self._units = units
-        self._vectors = vectors(self._names)
+        self._all_vectors = vectors(self._names)
+        self._vectors = [vector for vector in self._all_vectors if set(vector.elements) <= set(found)]
 
     def find(self, quantity: Quantity, ask: Ask | None, by_unit: bool = False) -> tuple[Choice | None, str]:
         """What the quantity is, or None and why: what it may be and how to say so; empty if nothing looks like it.
@@ -143,13 +149,15 @@ class Matcher:
                 f"{short(quantity.name)}={text}: {fault}; {self.where} has {', '.join(self._names) or 'none'}"
             )
         said += [order] if order in ORDERS else []
-        own = Unit(units[-1]) if units else self._units.get(elements[0])
+        own = [Unit(units[-1]) if units else self._units.get(element) for element in elements]
         try:
-            factor = conversion(own, Unit(quantity.unit)).factor
+            factors = [conversion(unit, Unit(quantity.unit)).factor for unit in own]
         except UnitError as error:
             raise ValueError(f"{short(quantity.name)}={text}: {error}") from None
         form = _checked_form(quantity, text, said)
-        return Choice(quantity.name, elements, tuple(sign * factor for sign in signs), own.name if own else None, form)
+        signed = tuple(sign * factor for sign, factor in zip(signs, factors, strict=True))
+        named = ", ".join(dict.fromkeys(unit.name for unit in own if unit)) or None
+        return Choice(quantity.name, elements, signed, named, form)
 
     def there_is(self, size: int) -> str:
         """Vectors of a size, for messages."""
@@ -159,7 +167,7 @@ class Matcher:
 
     def _called(self, quantity: Quantity, base: str, text: str) -> Vector:
         """omega for omega_*: the place of its elements and what joins it on may be left out. Raises ValueError."""
-        sized = [v for v in self._vectors if len(v.elements) == quantity.size]
+        sized = [v for v in self._all_vectors if len(v.elements) == quantity.size]
         for same in (
             [v for v in sized if base in (v.name, v.name.replace(PLACE, "").strip("_."))],
             [v for v in sized if words_of(base) == v.words != []],
