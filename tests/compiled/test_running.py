@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -84,10 +85,13 @@ def test_a_long_record_goes_on_where_a_portion_ends(at_once: None, monkeypatch: 
 
 
 @needs_compiler
-def test_a_long_simulation_goes_on_where_a_call_ends(at_once: None, monkeypatch: pytest.MonkeyPatch) -> None:
-    """So that it can be interrupted between calls. 51 rows of 20 solver steps, three of them in a call."""
+@pytest.mark.parametrize("steps", [70, 10])
+def test_a_long_simulation_goes_on_where_a_call_ends(
+    steps: int, at_once: None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """So that it can be interrupted between calls. 51 rows of 20 solver steps, three of them in a call, or one."""
     whole = running.simulate(BLOCKS["pendulum"], 1.02, 0.02)
-    monkeypatch.setattr(rows, "_SOLVER_STEPS", 70)
+    monkeypatch.setattr(rows, "_SOLVER_STEPS", steps)
     in_calls = running.simulate(BLOCKS["pendulum"], 1.02, 0.02)
     assert all(np.array_equal(whole[name], in_calls[name]) for name in whole.values)
 
@@ -108,11 +112,12 @@ def test_without_a_compiler_the_interpreter_serves_and_says_so_once(
 
 
 @needs_compiler
-def test_a_library_that_others_can_write_is_not_loaded(fresh: Path) -> None:
+@pytest.mark.parametrize(("what", "mode"), [("file", 0o620), ("file", 0o602), ("folder", 0o720), ("folder", 0o702)])
+def test_a_library_that_others_can_write_is_not_loaded(what: str, mode: int, fresh: Path) -> None:
     inputs = readings(BLOCKS["rizun2008"], 50)
     running.run(BLOCKS["rizun2008"], inputs)
     (kept,) = fresh.rglob(f"rizun2008{library._SUFFIX}")
-    kept.chmod(0o666)
+    (kept if what == "file" else kept.parent).chmod(mode)
     library._loaded.cache_clear()
     with pytest.warns(UserWarning, match="belongs to others or can be written by them; delete it"):
         result = running.run(BLOCKS["rizun2008"], inputs)
@@ -133,6 +138,27 @@ def test_a_kept_library_that_was_damaged_is_compiled_again(fresh: Path) -> None:
     result = running.run(BLOCKS["rizun2008"], inputs)
     assert np.array_equal(result["roll"], interpreted.run(BLOCKS["rizun2008"], inputs)["roll"])
     assert len(kept.read_bytes()) == len(whole)
+
+
+@needs_compiler
+def test_a_library_that_is_kept_serves_short_runs_too_and_none_but_its_own_block(
+    fresh: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    running.run(MIRROR, readings(MIRROR, 20))
+    library.compiled.cache_clear()
+    monkeypatch.setattr(library, "_ROWS_FOR_A_COMPILATION", 10**9)
+    assert library.compiled(MIRROR).library(1) is not None
+    other = replace(MIRROR, step=lambda x, u, p: vars(x) | dict(sum=x.sum - u.scalar))
+    assert library.compiled(other).library(1) is None
+
+
+def test_where_nothing_can_be_kept_the_interpreter_serves(fresh: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (fresh / "file").write_text("")
+    monkeypatch.setattr(library, "user_cache_path", lambda _name: fresh / "file")
+    inputs = readings(MIRROR, 20)
+    with pytest.warns(UserWarning, match="blocks run in CasADi's interpreter"):
+        result = running.run(MIRROR, inputs)
+    assert np.array_equal(result["sum"], interpreted.run(MIRROR, inputs)["sum"], equal_nan=True)
 
 
 @needs_compiler

@@ -69,7 +69,7 @@ def test_the_noise_of_a_seed_is_the_same_draw_by_draw(seed: int, backend: Backen
 
 
 @pytest.mark.parametrize("kind", fmu.KINDS)
-@pytest.mark.parametrize(("h", "max_step"), [(0.1 * 3, 0.1), (0.0101, 0.001), (1e-9, 1e-3), (0.5, 0.001)])
+@pytest.mark.parametrize(("h", "max_step"), [(0.1 * 3, 0.1), (0.0101, 0.001), (1e-9, 1e-3), (5e-11, 0.1), (0.5, 0.001)])
 def test_a_plant_takes_the_same_solver_steps(h: float, max_step: float, kind: str) -> None:
     """Also where rounding makes h a little longer than a whole number of the longest steps."""
     block = BLOCKS["double_pendulum"]
