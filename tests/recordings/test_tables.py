@@ -258,6 +258,14 @@ def test_files_of_phyphox_and_x_io_tell_their_units(tmp_path):
     assert np.allclose(recording.mag, MAG, atol=1e-4)
 
 
+def test_what_says_nothing_of_a_file_is_refused_and_not_passed_over(tmp_path):
+    path = file(tmp_path, lines_of(OURS, TIME, GYRO, ACCEL))
+    with pytest.raises(RecordingError, match="--stream is for logs"):
+        read(path, stream="imu 1")
+    with pytest.raises(RecordingError, match="has no columns to tell"):
+        read(tmp_path / "a.mat", columns=["time=t"])
+
+
 # Rows
 
 

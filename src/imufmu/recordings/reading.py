@@ -141,6 +141,7 @@ def read(
     if told.rate is not None and not _PERIOD_BOUNDS.minimum <= 1 / (told.rate or np.nan) <= _PERIOD_BOUNDS.maximum:
         raise RecordingError(f"{path}: a rate of {told.rate:g} Hz cannot be; give samples per second")
     turned = parsed_axes(told.axes, told.mount)
+    _check_told(path, told)
     try:
         raw = _reader(path)(path, told)
     except OSError as error:
@@ -161,6 +162,15 @@ def recordings_in(folder: Path) -> list[Path]:
         return sorted(path for path in folder.iterdir() if is_recording(path))
     except OSError as error:
         raise RecordingError(f"{folder}: cannot list the folder: {error.strerror}") from None
+
+
+def _check_told(path: Path, told: Told) -> None:
+    """Raises RecordingError for what says nothing of a file of this kind, and would be passed over."""
+    suffix = path.suffix.lower()
+    if told.columns and suffix == ".mat":
+        raise RecordingError(f"{path}: a trial of BROAD has no columns to tell")
+    if told.stream and not is_log(path):
+        raise RecordingError(f"{path}: a file of this kind holds one recording; --stream is for logs")
 
 
 def _reader(path: Path) -> Callable[[Path, Told], Raw]:
