@@ -149,6 +149,16 @@ def test_of_three_sensors_the_one_is_wrong_that_fits_neither_of_the_others(tmp_p
     assert axes_doubts(recorded(tmp_path)) == []
 
 
+def test_the_axis_that_points_down_in_a_left_handed_set_is_named(tmp_path):
+    flipped = np.array([1, 1, -1])
+    write_csv(tmp_path / "walk.csv", {"time": MOTION["time"], "gyro": GYRO * flipped, "accel": ACCEL * flipped})
+    (doubt,) = axes_doubts(read(tmp_path / "walk.csv"))
+    both = doubt.split("flipped in both: ")[1].split("--columns ")[1:]
+    mended = read(tmp_path / "walk.csv", columns=[column.strip() for column in both])
+    assert np.allclose(mended.gyro, GYRO) and np.allclose(mended.accel, ACCEL)
+    assert axes_doubts(mended) == []
+
+
 def test_a_magnetometer_that_stands_still_says_nothing_of_the_gyroscope(tmp_path):
     assert axes_doubts(recorded(tmp_path, mag=np.tile([0.0, 20, -45], (len(GYRO), 1)))) == []
     assert axes_doubts(recorded(tmp_path, mag=0 * GYRO)) == []

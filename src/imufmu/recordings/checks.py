@@ -41,7 +41,7 @@ def axes_doubts(recording: Recording) -> list[str]:
     if not by_gravity.fits and field_fits:  # no sign of the accelerometer does that: it is motion
         return []
     if not by_gravity.fits:
-        return [told(by_gravity, _names(recording, "gyro"))]
+        return [told(by_gravity, _names(recording, "gyro")) + _of_both(recording, by_gravity)]
     if gravity_fits and not by_field.fits and by_field.scale != 1:
         return ["mag does not turn as gyro and accel say: it stands still, or is disturbed all the time"]
     if gravity_fits and not by_field.fits and by_field.is_of_vector:
@@ -53,6 +53,24 @@ def axes_doubts(recording: Recording) -> list[str]:
     if not by_field.fits and by_field.scale == 1:
         return [told(by_field, _names(recording, "gyro"), "the magnetic field")]
     return []
+
+
+def _of_both(recording: Recording, fit: Turning) -> str:
+    """The remedy for a left-handed set whose flipped axis shows: the one that points down at the start."""
+    if fit.scale != 1 or not (fit.matrix == -np.eye(3)).all():
+        return ""
+    first = recording.accel[recording.time < recording.time[0] + 1.0]
+    up = (
+        np.median(first[np.isfinite(first).all(axis=1)], axis=0)
+        if np.isfinite(first).all(axis=1).any()
+        else np.zeros(3)
+    )
+    axis = int(np.argmin(up))
+    if up[axis] > -0.9 * np.linalg.norm(up):
+        return ""
+    signs = np.diag([-1 if i == axis else 1 for i in range(3)])
+    both = [f"--columns {signal}={columns_told(signs, _names(recording, signal))}" for signal in ("gyro", "accel")]
+    return f"; if {'xyz'[axis]}, which points down at the start, is flipped in both: {' '.join(both)}"
 
 
 def _names(recording: Recording, signal: str) -> Sequence[str]:
