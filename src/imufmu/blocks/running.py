@@ -97,7 +97,8 @@ def run(
 
     inputs: array (n,) or (n, k) per input name; a missing name stays at its start value. NaN marks missing samples.
     parameters: values by name. initial_state: replaces the block's own state of that name after the first sample.
-    following: evaluates all samples behind the first; by default ``interpreted``.
+    following: evaluates all samples behind the first; by default ``interpreted``. What a block tells late has a signal
+    ``sample_time`` (s), too: the instant that each row belongs to.
     Raises ParameterError for parameters, ValueError for inputs that do not fit, StepError where the plant of a series
     diverges.
     """
@@ -117,10 +118,15 @@ def run(
         some = slice(first, min(first + _PORTION, n))
         x, y[some] = following(block, x, u[some], p, draws(streams, first, some.stop - first))
     period = p[_names(block).index("sample_period")]
-    time = start_time + np.arange(n) * period
+    since_start = np.arange(n) * period
+    time = start_time + since_start
     if block.has_solver and not np.isfinite(y).all():
         raise StepError(chain_diverged(block, time[np.argmin(np.isfinite(y).all(axis=1))], period))
-    return Trajectory(time, by_name(block.reported, y), {signal.name: signal.unit for signal in block.reported})
+    values = by_name(block.reported, y)
+    units: dict[str, str | None] = {signal.name: signal.unit for signal in block.reported}
+    if block.delayed_by:
+        values["sample_time"], units["sample_time"] = start_time + (since_start - values[block.delayed_by]), "s"
+    return Trajectory(time, values, units)
 
 
 def simulate(
