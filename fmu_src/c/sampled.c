@@ -74,7 +74,8 @@ static void remember_inputs(State *s) { memcpy(s->sampled_inputs, s->values, N_I
 static void stamp(Instance *c) {
     State *s = &c->state;
     double k = s->next_sample > 0 ? (double)(s->next_sample - 1) : 0.0;
-    s->values[SAMPLE_TIME] = s->start_time + k * sample_period(c);
+    double delay = DELAYED ? reported_by(c)[DELAY_AT] : 0.0;
+    s->values[SAMPLE_TIME] = s->start_time + (k * sample_period(c) - delay);
 }
 
 /* Outputs as of the first sample if it were taken now; nothing once it was taken. */

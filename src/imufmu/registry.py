@@ -15,6 +15,8 @@ ESTIMATORS: tuple[Block, ...] = (
     bennett2014.BLOCK,
     plumb.BLOCK,
 )
+# They tell the attitude of a while ago, and of which instant.
+DELAYED: tuple[Block, ...] = (plumb.LAGGED,)
 PLANTS: tuple[Block, ...] = (
     pendulum.PENDULUM,
     pendulum.DOUBLE_PENDULUM,
@@ -24,4 +26,4 @@ PLANTS: tuple[Block, ...] = (
 )
 SENSORS: tuple[Block, ...] = (imu.BLOCK,)
 
-BLOCKS: dict[str, Block] = {block.name: block for block in (*ESTIMATORS, *PLANTS, *SENSORS)}
+BLOCKS: dict[str, Block] = {block.name: block for block in (*ESTIMATORS, *DELAYED, *PLANTS, *SENSORS)}

@@ -52,7 +52,9 @@ def test_directional_derivatives_are_those_of_repeating_the_last_step_with_other
     # Rounding of 1e-16 / eps, and a truncation of eps^2: both 1e-10, times what outputs of the size 100 amplify.
     np.testing.assert_allclose(actual, difference, rtol=1e-6, atol=1e-6)
     # A first sample may depend on parameters alone; a car feels its controls by their lags only.
-    assert steps < 2 or name == "vehicle" or np.any(actual != 0)
+    # What is told late hangs on nothing of now.
+    is_late = isinstance(block, SampledBlock) and block.delayed_by
+    assert steps < 2 or name == "vehicle" or is_late or np.any(actual != 0)
     instance.slave.freeInstance()
 
 

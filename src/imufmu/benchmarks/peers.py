@@ -30,6 +30,9 @@ _FUSION_SETTINGS: Mapping[str, Any] = {
 }
 
 
+NAMES = ("VQF", "BasicVQF", "imufusion", "RIANN", "offlineVQF")  # of all, installed or not
+
+
 def peers() -> list[Contender]:
     """The filters whose packages are installed, with the parameters their authors advise."""
     found = []

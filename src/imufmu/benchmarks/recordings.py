@@ -40,6 +40,7 @@ from .contenders import (
     with_wheels,
 )
 from .heading import HeadingScore, heading_scores
+from .peers import NAMES as PEERS
 from .peers import heading_peers, offline_peers, peers
 from .sources import Place, Source, sources
 from .starts import StartScore, start_scores
@@ -170,8 +171,8 @@ def _contests(
     if offline:
         contenders = [*offline_contenders(names, settings), *offline_peers()]
         contests.append(_Contest("offline, the whole record known", contenders))
-    known = {c.name for contest in contests for c in contest.contenders}
-    for name in without - known:
+    known = {c.name: None for contest in contests for c in contest.contenders} | dict.fromkeys(PEERS)
+    for name in without - known.keys():
         raise ValueError(no_such("filter", name, known))
     return [replace(c, contenders=[x for x in c.contenders if x.name not in without]) for c in contests]
 

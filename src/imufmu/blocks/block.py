@@ -213,11 +213,15 @@ class Block:
 
 @dataclass(frozen=True)
 class SampledBlock(Block):
-    """A block that advances at multiples of ``sample_period`` (default ``period``, s)."""
+    """A block that advances at multiples of ``sample_period`` (default ``period``, s).
+
+    delayed_by: the output that says how long before the sample (s) the instant lies that the outputs belong to.
+    """
 
     initial: Callable[..., Expressions]
     step: Callable[..., Expressions]
     period: float = 0.01
+    delayed_by: str = ""
     slow_due: Callable[..., Any] | None = None
     slow_steps: tuple[Callable[..., Expressions], ...] = ()
 

@@ -150,6 +150,7 @@ class SampledInstance(Instance):
         self._next = buffered(block.next_function, (self.x, self.u, self.p, self._w), (self._x_next, self.y))
         names = [v.name for v in block.variables if v.group == "parameter"]
         self._period_at = names.index("sample_period")
+        self._delay_at = block.place_of(block.delayed_by) if block.delayed_by else None
 
     @property
     def sample_period(self) -> float:
@@ -158,7 +159,8 @@ class SampledInstance(Instance):
     @property
     def sample_time(self) -> float:
         """Instant of the sample that the outputs belong to (s); the start time before the first."""
-        return self.start_time + max(self.next_sample - 1, 0) * self.sample_period
+        delay = float(self.y[self._delay_at]) if self._delay_at is not None else 0.0
+        return self.start_time + (max(self.next_sample - 1, 0) * self.sample_period - delay)
 
     def initialise(self, start_time: float) -> None:
         super().initialise(start_time)

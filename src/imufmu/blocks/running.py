@@ -15,7 +15,7 @@ from .instance import LONGEST_STEP, SampledInstance, StepError, chain_diverged, 
 from .noise import draws
 from .signals import Signal, State, total_size
 
-_CHUNK = 1024  # steps evaluated by one call into CasADi
+_CHUNK = 1024  # steps evaluated by one call into CasADi, at most
 _PORTION = 64 * _CHUNK  # samples whose noise is drawn at a time
 
 
@@ -53,11 +53,12 @@ def interpreted(
     block: SampledBlock, x: np.ndarray, u: np.ndarray, p: np.ndarray, w: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Samples in a row by CasADi's interpreter: state behind the last one, and the reported signals of each."""
-    n, chunk, p_columns = len(u), _chunk(block.next_function), np.tile(p[:, None], _CHUNK)
+    n, size = len(u), min(_CHUNK, 1 << (len(u) - 1).bit_length()) if len(u) else 1
+    chunk, p_columns = _chunk(block.next_function, size), np.tile(p[:, None], size)
     y = np.empty((n, total_size(block.reported)))
-    for first in range(0, n, _CHUNK):
-        some = slice(first, min(first + _CHUNK, n))
-        states, rows = chunk(x, _padded(u[some]), p_columns, _padded(w[some]))
+    for first in range(0, n, size):
+        some = slice(first, min(first + size, n))
+        states, rows = chunk(x, _padded(u[some], size), p_columns, _padded(w[some], size))
         x = states[:, some.stop - first - 1].full().ravel()
         y[some] = rows.full().T[: some.stop - first]
     return x, y
@@ -72,10 +73,14 @@ def solved_by_interpreter(
     states[0] = x
     t = (time[:-1, None] + np.arange(per_row) * h).reshape(-1, 1)
     u_held = np.repeat(u[:-1], per_row, axis=0)
-    chunk, p_columns, h_columns = _chunk(block.advance_function), np.tile(p[:, None], _CHUNK), np.full((1, _CHUNK), h)
+    chunk, p_columns, h_columns = (
+        _chunk(block.advance_function, _CHUNK),
+        np.tile(p[:, None], _CHUNK),
+        np.full((1, _CHUNK), h),
+    )
     for first in range(0, len(t), _CHUNK):
         some = slice(first, min(first + _CHUNK, len(t)))
-        reached = chunk(x, _padded(u_held[some]), p_columns, _padded(t[some]), h_columns).full().T
+        reached = chunk(x, _padded(u_held[some], _CHUNK), p_columns, _padded(t[some], _CHUNK), h_columns).full().T
         x = reached[some.stop - first - 1]
         done = np.arange(some.start + 1, some.stop + 1)  # solver steps behind us after each column
         whole = done % per_row == 0
@@ -97,7 +102,8 @@ def run(
 
     inputs: array (n,) or (n, k) per input name; a missing name stays at its start value. NaN marks missing samples.
     parameters: values by name. initial_state: replaces the block's own state of that name after the first sample.
-    following: evaluates all samples behind the first; by default ``interpreted``.
+    following: evaluates all samples behind the first; by default ``interpreted``. What a block tells late has a signal
+    ``sample_time`` (s), too: the instant that each row belongs to.
     Raises ParameterError for parameters, ValueError for inputs that do not fit, StepError where the plant of a series
     diverges.
     """
@@ -117,10 +123,15 @@ def run(
         some = slice(first, min(first + _PORTION, n))
         x, y[some] = following(block, x, u[some], p, draws(streams, first, some.stop - first))
     period = p[_names(block).index("sample_period")]
-    time = start_time + np.arange(n) * period
+    since_start = np.arange(n) * period
+    time = start_time + since_start
     if block.has_solver and not np.isfinite(y).all():
         raise StepError(chain_diverged(block, time[np.argmin(np.isfinite(y).all(axis=1))], period))
-    return Trajectory(time, by_name(block.reported, y), {signal.name: signal.unit for signal in block.reported})
+    values = by_name(block.reported, y)
+    units: dict[str, str | None] = {signal.name: signal.unit for signal in block.reported}
+    if block.delayed_by:
+        values["sample_time"], units["sample_time"] = start_time + (since_start - values[block.delayed_by]), "s"
+    return Trajectory(time, values, units)
 
 
 def simulate(
@@ -202,14 +213,14 @@ def reached_at(time: np.ndarray, step: float) -> np.ndarray:
 
 
 @lru_cache(maxsize=64)
-def _chunk(function: Any) -> Any:
-    """The function applied _CHUNK times, its first argument accumulated."""
-    return function.mapaccum(_CHUNK)
+def _chunk(function: Any, size: int) -> Any:
+    """The function applied so many times, its first argument accumulated."""
+    return function.mapaccum(size)
 
 
-def _padded(rows: np.ndarray) -> np.ndarray:
-    """Rows as _CHUNK columns, the last one repeated."""
-    return np.pad(rows, ((0, _CHUNK - len(rows)), (0, 0)), mode="edge").T
+def _padded(rows: np.ndarray, size: int) -> np.ndarray:
+    """Rows as so many columns, the last one repeated."""
+    return np.pad(rows, ((0, size - len(rows)), (0, 0)), mode="edge").T
 
 
 def _streams(block: Block, p: np.ndarray) -> list[tuple[float, int]]:

@@ -64,6 +64,7 @@ def series(*blocks: Block) -> Series:
         initial=_nothing,
         step=_nothing,
         period=sampled[-1].period,
+        delayed_by=sampled[-1].delayed_by,
         normals=sum(width for block in blocks for _, width in block.seeds),
         blocks=tuple(blocks),
     )

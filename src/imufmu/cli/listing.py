@@ -32,9 +32,9 @@ def list_(json: Json = False) -> None:
 
 
 def _blocks() -> list[Entry]:
-    from ..registry import ESTIMATORS, PLANTS, SENSORS
+    from ..registry import DELAYED, ESTIMATORS, PLANTS, SENSORS
 
-    kinds = (("estimator", ESTIMATORS), ("sensor", SENSORS), ("plant", PLANTS))
+    kinds = (("estimator", (*ESTIMATORS, *DELAYED)), ("sensor", SENSORS), ("plant", PLANTS))
     return [Entry(kind, block.name, block.summary) for kind, blocks in kinds for block in blocks]
 
 

@@ -50,6 +50,7 @@ def sizes(block: Block, functions: dict[str, Any]) -> dict[str, int]:
     """Lengths of vectors, the room that the functions need, the place of ``status``: by their names in C."""
     needs = list(functions.values())
     begins_anew = isinstance(block, SampledBlock) and block.begins_anew
+    delayed = block.delayed_by if isinstance(block, SampledBlock) else ""
     return {
         "N_INPUTS": total_size(block.inputs),
         "N_PARAMETERS": total_size(block.parameters),
@@ -60,6 +61,8 @@ def sizes(block: Block, functions: dict[str, Any]) -> dict[str, int]:
         "BEGINS_ANEW": int(begins_anew),
         "STATUS_AT": block.place_of("status") if begins_anew else 0,  # in the reported signals
         "RESTARTED": int(Status.RESTARTED),
+        "DELAYED": int(bool(delayed)),
+        "DELAY_AT": block.place_of(delayed) if delayed else 0,
         "SLOW_STEPS": int("block_slow" in functions),
         "N_FAST": functions["block_step"].numel_out(0) if "block_step" in functions else total_size(block.state),
         "N_NORMALS": block.normals,

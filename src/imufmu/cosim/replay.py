@@ -21,7 +21,7 @@ from ..fmi.native import cached_native_fmu
 from ..fmi.own import is_ours
 from ..recordings.checks import axes_doubts
 from ..recordings.reading import Recording, hold_missing
-from ..registry import BLOCKS, ESTIMATORS
+from ..registry import BLOCKS, DELAYED, ESTIMATORS
 from .apart import Instance, Instances
 from .errors import STEP_TIMEOUT, EndOfRun, SimulationError
 from .interface import Interface, WiringError, unit_of
@@ -116,7 +116,7 @@ def estimator_fmu(name: str, *, native: bool = False) -> Path:
         return (cached_native_fmu if native else cached_fmu)(name)
     if Path(name).suffix.lower() == ".fmu":
         return Path(name)
-    known = [block.name for block in ESTIMATORS]
+    known = [block.name for block in (*ESTIMATORS, *DELAYED)]
     raise ValueError(no_such("estimator", name, known, "or give the path of an .fmu file"))
 
 

@@ -37,11 +37,16 @@ def update(x: Any, P: Any, row: Row, y: Any, r: Any, accepted: Any = 1) -> tuple
 
     P: symmetric. accepted: 0 leaves both as they are.
     """
+    PH, variance = innovation(P, row, r)
+    K = ca.if_else(accepted, PH / variance, 0)
+    return x + K * (y - sum(h * x[i] for i, h in row.items())), symmetric(P - K @ PH.T)
+
+
+def innovation(P: Any, row: Row, r: Any) -> tuple[Any, Any]:
+    """Covariance (n,) of every state with a measurement of variance r, and the variance of its innovation."""
     PH, variance = _projected(P, row)
     finest = SHARPEST * sum(h**2 * P[i, i] for i, h in row.items())
-    noise = ca.if_else(r > finest, r, finest)
-    K = ca.if_else(accepted, PH / (variance + noise), 0)
-    return x + K * (y - sum(h * x[i] for i, h in row.items())), symmetric(P - K @ PH.T)
+    return PH, variance + ca.if_else(r > finest, r, finest)
 
 
 def update_by_state(x: Any, P: Any, i: int, h: Any, y: Any, r: Any, accepted: Any = 1) -> tuple[Any, Any]:

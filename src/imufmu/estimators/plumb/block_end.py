@@ -64,6 +64,7 @@ from .covariance import (
     PSI,
     B,
     D,
+    Log,
     V,
     forgotten,
     full,
@@ -95,17 +96,24 @@ STATES = (
     State("intensity"),
 )
 
-# What a smoother wants to know of a block, beside its results.
-RECORD = (
-    State("P_before", (N_ERRORS * (N_ERRORS + 1) // 2,)),
+MEASUREMENTS = 6  # of a block, at most
+
+# What smoothers want to know of a block, beside its results: one that goes back, one that goes along, both.
+BOTH = (
     State("error", (N_ERRORS,)),
     State("kept", (N_ERRORS,)),
     State("S_block", (3, 3)),
     State("dV_block", (3,)),
     State("rate_block", (3,)),
-    State("Q_turn", (3, 3)),
     State("anew"),
     State("phi", (3,)),
+)
+GOING_BACK = (State("P_before", (N_ERRORS * (N_ERRORS + 1) // 2,)), State("Q_turn", (3, 3)))
+GOING_ALONG = (
+    State("log_h", (MEASUREMENTS, N_ERRORS)),
+    State("log_gain", (MEASUREMENTS, N_ERRORS)),
+    State("log_pull", (MEASUREMENTS,)),
+    State("log_weight", (MEASUREMENTS,)),
 )
 
 SlowStep = Callable[[SimpleNamespace, SimpleNamespace, SimpleNamespace], Expressions]
@@ -126,7 +134,7 @@ RESTING, OVERRULING, MOVING, ROLLING, BEGINNING, STARTING = rest.REST, rest.OVER
 
 
 def slow_due(x: SimpleNamespace, u: SimpleNamespace, p: SimpleNamespace) -> Any:
-    """Which of SLOW_STEPS is due: at the end of a block of m samples, and at the first usable sample."""
+    """Which of ``steps`` is due: at the end of a block of m samples, and at the first usable sample."""
     full_block, wheels = (x.samples + 0.5) * p.sample_period > p.h, vehicle.is_valid(u)
     stands = ca.logic_and(rest.is_calm(x), x.verdict > 0)
     at_end = ca.if_else(stands, x.verdict, ca.if_else(wheels, ROLLING, MOVING))
@@ -159,7 +167,7 @@ def end_at_start(x: SimpleNamespace, u: SimpleNamespace, p: SimpleNamespace) -> 
     # A turn as large as those at the start would make nonsense of what was learnt about the heading.
     anew = {name: ca.if_else(present, value, getattr(x, name)) for name, value in field.items()}
     lost = ca.if_else(ca.logic_and(after["coarse"], x.lost > 0), x.lost, ca.fmax(x.lost - H, 0))
-    record = kept_for_later(x, H, p, P_before=full(after["P"]), anew=1, turn=after.pop("phi"))
+    record = kept_for_later(x, H, p, [], P_before=full(after["P"]), anew=1, turn=after.pop("phi"))
     record |= dict(error=ca.SX.zeros(N_ERRORS))
     return (
         after
@@ -180,9 +188,10 @@ def end_in_motion(x: SimpleNamespace, u: SimpleNamespace, p: SimpleNamespace) ->
     P = forgotten(P, forget, ca.if_else(lost, p.P0_v**2, p.rr_v2**2 / H))
     travels = ca.logic_and(known, ca.logic_not(lost))
     variance, learns, states = travel.velocity(v_N, P, travels, steady, x, H, p)
-    record = kept_for_later(x, H, p, P_before=P, kept=scale * kept(forget))
-    error, P = measure(ca.SX.zeros(N_ERRORS), P, V, ca.vertsplit(-v_N), variance, learns)  # (7)
-    after = corrected(x, u, v_N, error, P, H, p, resting=0, steady=steady) | states | record
+    log: Log = []
+    error, P_after = measure(ca.SX.zeros(N_ERRORS), P, V, ca.vertsplit(-v_N), variance, learns, log)  # (7)
+    after = corrected(x, u, v_N, error, P_after, H, p, resting=0, steady=steady) | states
+    after |= kept_for_later(x, H, p, log, P_before=P, kept=scale * kept(forget))
     goes_on = ca.logic_not(lost) * (states["quiet"] < p.t_v)
     after |= dict(levelled=ca.logic_and(x.levelled, goes_on), rolling=ca.logic_and(x.rolling, goes_on))
     anew = dict(UNKNOWN, **start.begin(p.g, p), lost=LOST_SHOWN)
@@ -194,9 +203,10 @@ def end_in_vehicle(x: SimpleNamespace, u: SimpleNamespace, p: SimpleNamespace) -
     turn = start.to_the_top(ca.if_else(x.coarse, x.dV, UP))  # one block says more than one sample
     x = upright(x, turn)
     v_N, P, scale, H = predicted_block(x, p)
-    v_N, error, P, states = vehicle.measured_velocity(v_N, P, rate(x, x.gyro_used), H, x, u, p)
+    log: Log = []
+    v_N, error, P, states = vehicle.measured_velocity(v_N, P, rate(x, x.gyro_used), H, x, u, p, log)
     P_before, scale = states.pop("P_before"), scale * states.pop("kept")
-    record = kept_for_later(x, H, p, P_before=P_before, kept=scale, anew=x.coarse, turn=turn)
+    record = kept_for_later(x, H, p, log, P_before=P_before, kept=scale, anew=x.coarse, turn=turn)
     after = corrected(x, u, v_N, error, P, H, p, resting=0, steady=0)
     return after | dict(speed2=x.speed2, lasting=after["v"], coarse=0) | states | record
 
@@ -210,9 +220,11 @@ def end_at_rest(x: SimpleNamespace, u: SimpleNamespace, p: SimpleNamespace) -> E
     first = ca.logic_and(lasts, ca.logic_not(x.rested))
     for i in range(N_ERRORS)[B]:
         P[i, i] = ca.if_else(ca.logic_and(first, P[i, i] < p.P0_raw**2), p.P0_raw**2, P[i, i])
-    record = kept_for_later(x, H, p, P_before=P, kept=scale * kept(travelled))
-    error, P = measure(ca.SX.zeros(N_ERRORS), P, V, ca.vertsplit(-v_N), variance)  # (9)
-    error, P = measure(error, P, B, ca.vertsplit(x.gyro_lp - x.b), p.rr_g**2 / H)  # (9)
+    log: Log = []
+    P_before = P
+    error, P = measure(ca.SX.zeros(N_ERRORS), P, V, ca.vertsplit(-v_N), variance, log=log)  # (9)
+    error, P = measure(error, P, B, ca.vertsplit(x.gyro_lp - x.b), p.rr_g**2 / H, log=log)  # (9)
+    record = kept_for_later(x, H, p, log, P_before=P_before, kept=scale * kept(travelled))
     after = corrected(x, u, v_N, error, P, H, p, resting=1, steady=0) | stands(x, u) | record
     return after | dict(levelled=ca.logic_or(x.levelled, lasts), rested=ca.logic_or(x.rested, lasts))
 
@@ -224,7 +236,7 @@ def end_overruled(x: SimpleNamespace, u: SimpleNamespace, p: SimpleNamespace) ->
     std = ca.vertcat(OVERRULED, OVERRULED, p.P0_psi, *[p.rr_v / ca.sqrt(H)] * 3, *[p.P0_raw] * 3, *[p.P0_D] * 9)
     nothing, P = ca.SX.zeros(N_ERRORS), ca.diag(std**2)
     after = corrected(x, u, ca.SX.zeros(3), nothing, P, H, p, resting=1, steady=0) | stands(x, u)
-    record = kept_for_later(x, H, p, P_before=P, anew=1, turn=turn)
+    record = kept_for_later(x, H, p, [], P_before=P, anew=1, turn=turn)
     return after | dict(levelled=0, level=1, lost=LOST_SHOWN) | record
 
 
@@ -330,17 +342,24 @@ def kept_for_later(
     x: SimpleNamespace,
     H: Any,
     p: SimpleNamespace,
+    log: Log,
     *,
     P_before: Any,
     kept: Any = 1,
     anew: Any = 0,
     turn: Any = 0,
 ) -> dict[str, Any]:
-    """RECORD after a block, but ``error``.
+    """BOTH, GOING_BACK and GOING_ALONG after a block, but ``error``.
 
     P_before: before the measurements. kept: factors (18,) of the errors of (5). turn: of N, where it began ``anew``.
     """
+    nothing = (ca.SX.zeros(N_ERRORS), ca.SX.zeros(N_ERRORS), 0, 0)
+    h, gain, pull, weight = zip(*log, *[nothing] * (MEASUREMENTS - len(log)), strict=True)
     return dict(
+        log_h=ca.horzcat(*h).T,
+        log_gain=ca.horzcat(*gain).T,
+        log_pull=ca.vertcat(*pull),
+        log_weight=ca.vertcat(*weight),
         P_before=upper_triangle(P_before),
         kept=kept * ca.SX.ones(N_ERRORS),
         S_block=mean_attitude(x, p),
@@ -352,26 +371,16 @@ def kept_for_later(
     )
 
 
-def without_record(slow_step: SlowStep) -> SlowStep:
-    """A slow step that leaves out RECORD."""
-    names = {state.name for state in RECORD}
+def steps(record: tuple[State, ...] = ()) -> tuple[SlowStep, ...]:
+    """Slow steps RESTING to STARTING, each with what follows from the state after it and with these of the records."""
+    left_out = {state.name for state in (*BOTH, *GOING_BACK, *GOING_ALONG)} - {state.name for state in record}
 
-    def step(x: SimpleNamespace, u: SimpleNamespace, p: SimpleNamespace) -> Expressions:
-        return {name: value for name, value in slow_step(x, u, p).items() if name not in names}
+    def without(slow_step: SlowStep) -> SlowStep:
+        def step(x: SimpleNamespace, u: SimpleNamespace, p: SimpleNamespace) -> Expressions:
+            after = dict(slow_step(x, u, p))
+            after |= told(SimpleNamespace(**vars(x) | after), p)
+            return {name: value for name, value in after.items() if name not in left_out}
 
-    return step
+        return step
 
-
-def and_told(slow_step: SlowStep) -> SlowStep:
-    """A slow step, and what follows from the state after it."""
-
-    def step(x: SimpleNamespace, u: SimpleNamespace, p: SimpleNamespace) -> Expressions:
-        after = dict(slow_step(x, u, p))
-        return after | told(SimpleNamespace(**vars(x) | after), p)
-
-    return step
-
-
-# Numbers RESTING to STARTING.
-STEPS = (end_at_rest, end_overruled, end_in_motion, end_in_vehicle, begin, end_at_start)
-SLOW_STEPS = tuple(map(without_record, map(and_told, STEPS)))
+    return tuple(map(without, (end_at_rest, end_overruled, end_in_motion, end_in_vehicle, begin, end_at_start)))

@@ -13,13 +13,16 @@ from typing import Any
 import casadi as ca
 
 from ...blocks.rotations import matrix_from_quaternion, skew
-from ..kalman import update
+from ..kalman import Row, innovation, update
 
 PSI, V, B, D = (slice(0, 3), slice(3, 6), slice(6, 9), slice(9, 18))
 N_ERRORS = 18
 LARGEST_VARIANCE = 1.0  # rad2 of psi, rad2/s2 of b
 
 I3 = ca.SX.eye(3)
+
+# Of each measurement: its row h (18,), P h / s, innovation / s and 1 / s, with s the variance of the innovation.
+Log = list[tuple[Any, Any, Any, Any]]
 
 
 def predicted(P: Any, S: Any, x: SimpleNamespace, H: Any, p: SimpleNamespace) -> tuple[Any, Any]:
@@ -68,7 +71,9 @@ def within_bounds(P: Any) -> Any:
     return scale
 
 
-def measure(error: Any, P: Any, part: slice, values: Sequence[Any], variance: Any, learns: Any = 1) -> tuple[Any, Any]:
+def measure(
+    error: Any, P: Any, part: slice, values: Sequence[Any], variance: Any, learns: Any = 1, log: Log | None = None
+) -> tuple[Any, Any]:
     """Errors and covariance after measurements of the three errors ``part``, one after the other.
 
     variance: one for all, or (3,). learns: 0 leaves the errors of the gyroscope and their covariance as they are.
@@ -77,8 +82,22 @@ def measure(error: Any, P: Any, part: slice, values: Sequence[Any], variance: An
     accepted[B], accepted[D] = learns, learns
     variances = ca.vertsplit(variance * ca.SX.ones(3))
     for i, value, r in zip(range(N_ERRORS)[part], values, variances, strict=True):
-        error, P = update(error, P, {i: 1}, value, r, accepted)
+        error, P = one_update(error, P, {i: 1}, value, r, accepted, log=log)
     return error, P
+
+
+def one_update(
+    error: Any, P: Any, row: Row, value: Any, r: Any, accepted: Any = 1, used: Any = 1, log: Log | None = None
+) -> tuple[Any, Any]:
+    """``update`` of ``kalman``, and an entry in the log. used: 0 where it is not accepted at all."""
+    if log is not None:
+        PH, variance = innovation(P, row, r)
+        h = ca.SX(N_ERRORS, 1)
+        for i, h_i in row.items():
+            h[i] = h_i
+        off = value - sum(h_i * error[i] for i, h_i in row.items())
+        log.append((ca.densify(h), used * PH / variance, used * off / variance, used / variance))
+    return update(error, P, row, value, r, accepted)
 
 
 def tilt_variance(P: Any) -> Any:

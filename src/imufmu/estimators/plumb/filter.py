@@ -43,6 +43,7 @@ accelerometer sample that is missing leaves dV and T as they are.
 from __future__ import annotations
 
 from types import SimpleNamespace
+from typing import Any
 
 import casadi as ca
 
@@ -130,16 +131,19 @@ def output(x: SimpleNamespace, u: SimpleNamespace, p: SimpleNamespace) -> Expres
         gyro_bias=x.b,
         stationary=rest.at_rest(x),
         velocity_intensity=x.intensity,
-        status=x.missing
-        + v.Status.NOT_INITIALISED * (1 - x.started)
-        + v.Status.LOST * (x.lost > 0)
-        + heading.status(x, u),
+        status=status(x, u),
         velocity=x.v,
         gyro_error=x.D,
         tilt_covariance=tilt_covariance,
         yaw_offset=x.offset,
         yaw_offset_std=heading.offset_std(x),
     )
+
+
+def status(x: SimpleNamespace, u: SimpleNamespace) -> Any:
+    """Flags of this sample."""
+    flags = x.missing + v.Status.NOT_INITIALISED * (1 - x.started) + v.Status.LOST * (x.lost > 0)
+    return flags + heading.status(x, u)
 
 
 BLOCK = SampledBlock(
@@ -200,11 +204,11 @@ references, or where the step must be as small as can be; bennett2014 for two li
         real("h", "s", 0.05, (1e-6, 10), "Length of a block: time between corrections"),
         real("s_g", "rad/s/sqrt(Hz)", 0.0015, (0, 10), "Noise density of the gyroscope, with vibration"),
         real("k_g", "1/sqrt(Hz)", 3e-4, (0, 1), "Noise density of the gyroscope in proportion to the rate"),
-        real("k_j", "1", 0.05, (0, 10), "Error of a turn as a part of the change of the rate within a sample"),
+        real("k_j", "1", 0.03, (0, 10), "Error of a turn as a part of the change of the rate within a sample"),
         real("k_a", "1", 0.2, (0, 10), "Error of a velocity as a part of the change of the force within a sample"),
         real("s_s", "rad/s/sqrt(Hz)", 0.2, (0, 100), "Noise density of a gyroscope axis that is saturated or missing"),
         real(
-            "s_b", "rad/s2/sqrt(Hz)", 2e-4, (0, 1), "Random walk of the gyroscope bias; larger follows warm-up faster"
+            "s_b", "rad/s2/sqrt(Hz)", 1.4e-4, (0, 1), "Random walk of the gyroscope bias; larger follows warm-up faster"
         ),
         real(
             "s_a",
@@ -218,7 +222,7 @@ references, or where the step must be as small as can be; bennett2014 for two li
         real(
             "rr_g",
             "rad/s/sqrt(Hz)",
-            0.0012,
+            0.0007,
             (1e-6, 1e3),
             "Density of the low-passed gyroscope at rest, as a measurement of its bias",
         ),
@@ -264,7 +268,7 @@ references, or where the step must be as small as can be; bennett2014 for two li
     initial=initial,
     step=step,
     slow_due=block.slow_due,
-    slow_steps=block.SLOW_STEPS,
+    slow_steps=block.steps(),
     output=output,
     period=0.01,
 )

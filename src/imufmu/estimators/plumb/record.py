@@ -12,14 +12,15 @@ from ...blocks.signals import Signal
 from . import block_end as block
 from .filter import BLOCK
 
-_STATES = {state.name: state for state in (*BLOCK.state, *block.RECORD)}
+RECORD = (*block.BOTH, *block.GOING_BACK)
+_STATES = {state.name: state for state in (*BLOCK.state, *RECORD)}
 EVERY_SAMPLE = ("q", "samples", "started", "coarse")
-AT_ENDS = ("P", "resting", *(state.name for state in block.RECORD))
+AT_ENDS = ("P", "resting", *(state.name for state in RECORD))
 _TOLD = (*EVERY_SAMPLE, *AT_ENDS)
 
 
 def _initial(u: SimpleNamespace, p: SimpleNamespace) -> Expressions:
-    return {**BLOCK.initial(u, p), **{state.name: ca.SX.zeros(*state.shape) for state in block.RECORD}}
+    return {**BLOCK.initial(u, p), **{state.name: ca.SX.zeros(*state.shape) for state in RECORD}}
 
 
 def _output(x: SimpleNamespace, u: SimpleNamespace, p: SimpleNamespace) -> Expressions:
@@ -32,8 +33,8 @@ RECORDING = replace(
     name="plumb_record",
     outputs=tuple(signal for signal in BLOCK.outputs if signal.name in ("tilt_std", "status")),
     locals=tuple(Signal(name, "1", f"State {name} of plumb", -1e30, 1e30, _STATES[name].shape) for name in _TOLD),
-    state=(*BLOCK.state, *block.RECORD),
-    slow_steps=tuple(map(block.and_told, block.STEPS)),
+    state=(*BLOCK.state, *RECORD),
+    slow_steps=block.steps(RECORD),
     initial=_initial,
     output=_output,
 )

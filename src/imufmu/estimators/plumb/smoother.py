@@ -66,7 +66,7 @@ class _Known:
 
 
 def smoothed(records: Records) -> Smoothed:
-    """records: ``RECORD`` of ``block_end`` with P, coarse and resting, a row per block; the first is the start."""
+    """records: ``RECORD`` of ``record`` with P, coarse and resting, a row per block; the first is the start."""
     m = len(records["coarse"])
     blocks = dict(records) | {name: whole(records[name]) for name in ("P", "P_before")}
     blocks["F"] = over_rows(

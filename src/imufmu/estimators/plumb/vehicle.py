@@ -18,8 +18,8 @@ from the strapdown (4) and three measurements, with w the rate and R the attitud
 in place of (7). To first order e_f turns with psi_z by e_l, so (12) sees psi_z times e_l . v, and (13) minus psi_z
 times e_f . v; all three see db through the rate of (11). The directions are level, not the body's: a body on springs
 leans by some degrees against its road, which costs the cosine of that. (13) is a wheel that does not slip sideways; it
-does the more, the larger the acceleration a_l to the side. (14) leaves room for hills. s_c adds s_c^2 H to Q of dv: in
-a turn, bias and scale error of an accelerometer are accelerations that follow the vehicle round.
+does the more, the larger the acceleration a_l to the side. (14) leaves room for hills. Q of dv grows by (s_c + k_c |dV
+across e_z| / H)^2 H: bias and scale error of an accelerometer are accelerations that follow the vehicle round.
 
 A wheel that locks or spins tells a wrong s. (12) is left out where it is off by more than GATE standard deviations of
 prediction and measurement together. After t_f s without agreement s is believed again, as at the first valid s: v is
@@ -36,10 +36,10 @@ import casadi as ca
 
 from ...blocks import vocabulary as v
 from ...blocks.block import Expressions
-from ...blocks.rotations import matrix_from_euler, matrix_from_quaternion, unit
+from ...blocks.rotations import matrix_from_euler, matrix_from_quaternion, norm, unit
 from ...blocks.signals import Signal, State, real
-from ..kalman import surprise, update
-from .covariance import I3, N_ERRORS, PSI, B, V, forgotten, kept
+from ..kalman import surprise
+from .covariance import I3, N_ERRORS, PSI, B, Log, V, forgotten, kept, one_update
 
 GATE = 4.0  # standard deviations
 STANDING = 0.01  # m/s; a vehicle this slow may be at rest
@@ -52,11 +52,12 @@ INPUTS = (
 PARAMETERS = (
     real("mount", "rad", 0.0, (-7, 7), "Roll, pitch, yaw of the sensor in its vehicle", shape=(3,)),
     real("imu_position", "m", 0.0, (-100, 100), "Sensor seen from where forward_speed holds, vehicle axes", shape=(3,)),
-    real("s_f", "m/s/sqrt(Hz)", 0.1, (1e-6, 1e3), "Density of the error of forward_speed"),
-    real("s_l", "m/s/sqrt(Hz)", 0.1, (1e-6, 1e3), "Density of the sideways velocity, straight ahead"),
-    real("k_l", "s/sqrt(Hz)", 0.3, (0, 1e3), "Growth of that density with the acceleration to the side"),
+    real("s_f", "m/s/sqrt(Hz)", 0.05, (1e-6, 1e3), "Density of the error of forward_speed"),
+    real("s_l", "m/s/sqrt(Hz)", 0.05, (1e-6, 1e3), "Density of the sideways velocity, straight ahead"),
+    real("k_l", "s/sqrt(Hz)", 0.15, (0, 1e3), "Growth of that density with the acceleration to the side"),
     real("s_z", "m/s/sqrt(Hz)", 0.5, (1e-6, 1e3), "Density of the vertical velocity of a vehicle"),
-    real("s_c", "m/s2/sqrt(Hz)", 0.3, (0, 100), "Density that stands for bias and scale error of the accelerometer"),
+    real("s_c", "m/s2/sqrt(Hz)", 0.18, (0, 100), "Density that stands for the bias of the accelerometer"),
+    real("k_c", "1/sqrt(Hz)", 0.04, (0, 10), "Growth of that density with the acceleration along the road"),
     real("t_f", "s", 5.0, (0, 1e3), "How long a forward_speed that disagrees is left out"),
 )
 
@@ -77,7 +78,7 @@ def wheels_turn(u: SimpleNamespace) -> Any:
 
 
 def measured_velocity(
-    v_N: Any, P: Any, w: Any, H: Any, x: SimpleNamespace, u: SimpleNamespace, p: SimpleNamespace
+    v_N: Any, P: Any, w: Any, H: Any, x: SimpleNamespace, u: SimpleNamespace, p: SimpleNamespace, log: Log
 ) -> tuple[Any, Any, Any, dict[str, Any]]:
     """Velocity, errors and covariance after (12) to (14), and the states of this module with what came before those.
 
@@ -92,7 +93,7 @@ def measured_velocity(
     anew = ca.logic_or(ca.logic_not(x.rolling), x.disagreed > p.t_f)
     v_N = ca.if_else(anew, speed * forward + ca.cross(w_N, lever), v_N)
     P = forgotten(P, anew, p.P0_v**2)
-    P[V, V] += p.s_c**2 * H * I3
+    P[V, V] += (p.s_c + p.k_c * norm(x.dV[:2]) / H) ** 2 * H * I3
     before = dict(P_before=P, kept=kept(anew))
 
     v_r = v_N - ca.cross(w_N, lever)  # (11)
@@ -106,8 +107,9 @@ def measured_velocity(
     sideways = p.s_l + p.k_l * ca.fabs(speed * w_N[2])
     along, off, variance = row(forward, ca.dot(left, v_N)), speed - ca.dot(forward, v_r), p.s_f**2 / H
     agrees = surprise(P, along, off, variance) < GATE**2
-    error, P = update(error, P, along, off, variance, agrees)  # (12)
-    error, P = update(error, P, row(left, -ca.dot(forward, v_N)), -ca.dot(left, v_r), sideways**2 / H)  # (13)
-    error, P = update(error, P, row(up, 0), -v_r[2], p.s_z**2 / H)  # (14)
+    across = row(left, -ca.dot(forward, v_N))
+    error, P = one_update(error, P, along, off, variance, agrees, agrees, log)  # (12)
+    error, P = one_update(error, P, across, -ca.dot(left, v_r), sideways**2 / H, log=log)  # (13)
+    error, P = one_update(error, P, row(up, 0), -v_r[2], p.s_z**2 / H, log=log)  # (14)
     states = dict(rolling=1, disagreed=ca.if_else(agrees, 0, x.disagreed * (1 - anew) + H))
     return v_N, error, P, states | before
