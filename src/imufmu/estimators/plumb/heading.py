@@ -51,7 +51,7 @@ NO_FIELD = 1e-9  # in the unit of mag; a field smaller than this is none
 PARAMETERS = (
     real("declination", "rad", 0.0, (-pi, pi), "Magnetic North seen from true North, towards East"),
     real("s_h", "rad/sqrt(Hz)", 0.15, (1e-6, 1e3), "Density of the error of a heading by the magnetometer"),
-    real("k_h", "1/sqrt(Hz)", 11.0, (0, 1e3), "Growth of that density with the deviation of the field"),
+    real("k_h", "1/sqrt(Hz)", 10.0, (0, 1e3), "Growth of that density with the deviation of the field"),
     real("t_h", "s", 0.05, (0, 1e3), "Time constant of the low-passed field that this deviation is of"),
     real("eps_m", "1", 0.07, (0, 10), "Deviation of the field, of its norm, that means disturbed"),
     real("t_m", "s", 20.0, (0, 1e4), "How much of the undisturbed field its mean covers"),
