@@ -14,7 +14,7 @@ from imufmu.compiled.running import run
 from imufmu.scoring.metrics import heading_error
 from support import motions
 from support.motions import FIELD_N, Motion
-from support.plumb_motions import BLOCK, G, moving, rms
+from support.plumb_motions import BLOCK, G, consumer, moving, rms
 
 YAW = 2.0  # rad, of the sensor at the start
 BIAS = np.array([0.0, 0.0, 0.01])  # rad/s: yaw drifts by half a degree per second where the bias is not known
@@ -154,3 +154,13 @@ def test_zeros_in_between_count_for_nothing(hand: Motion) -> None:
     result = with_mag(hand, mag)
     assert np.abs(yaw_error_deg(hand, result)[4000:6500]).max() < 3
     assert not (result["status"].astype(int) & Status.MAG_REJECTED).any()
+
+
+@pytest.mark.parametrize("seed", [70, 71])
+def test_a_start_that_turns_out_upside_down_does_not_spoil_the_heading(seed: int) -> None:
+    """The first accelerometer sample is turned by half a turn about x: what it said of North goes with it."""
+    motion = moving(seed, 12, rate=1.0)
+    readings = consumer(motion) | {"mag": motion.mag}
+    readings["accel"][0] *= [1, -1, -1]
+    result = run(BLOCK, readings, {"sample_period": motion.dt, "g": G})
+    assert np.abs(yaw_error_deg(motion, result))[200:].max() < 5
