@@ -143,6 +143,22 @@ def test_the_whole_record_known_is_a_contest_of_its_own(data: Path) -> None:
     assert "plumb offline" not in {s.contender for s in benchmark(data / "walk", ["plumb"]).scores}
 
 
+def test_a_filter_that_lags_is_scored_for_the_instants_that_it_tells_of(tmp_path: Path) -> None:
+    """Rocking at 1.5 rad/s, where a lag of half a second that counted as error would be tens of degrees."""
+    time = np.arange(1200) * PERIOD
+    since = np.maximum(time - 4, 0)
+    roll = 0.5 * (1 - np.cos(3 * since))
+    record = level(0.0, 12.0) | {"roll": roll}
+    record["gyro"][:, 0] = 1.5 * np.sin(3 * since)
+    record["accel"] = G * np.column_stack([0 * roll, np.sin(roll), np.cos(roll)])
+    write_csv(tmp_path / "rocking.csv", record)
+    result = benchmark(tmp_path, ["plumb"], lags=[0.5], without=peers.NAMES)
+    (later,) = (s for s in result.scores if s.contest == "told later")
+    assert later.contender == "plumb_lag 0.5 s" and later.inclination_rmse_deg < 1 and later.nees < 3
+    with pytest.raises(ValueError, match=r"lag = 5 s is outside"):
+        benchmark(tmp_path, ["plumb"], lags=[5.0])
+
+
 def test_the_json_file_holds_scores_and_tables_and_no_nan(data: Path, tmp_path: Path) -> None:
     result = benchmark(data, ["rizun2008"])
     write_json(tmp_path / "b.json", result)

@@ -6,6 +6,7 @@ more with those that suit a hand-held or body-worn device; filters of others (``
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -19,6 +20,7 @@ from ..blocks.running import Trajectory
 from ..blocks.vocabulary import ACCEL, FORWARD_SPEED, GYRO, MAG, VERTICAL
 from ..compiled.offline import run_offline
 from ..compiled.running import run
+from ..estimators import plumb
 from ..files.names import no_such
 from ..registry import ESTIMATORS
 
@@ -52,6 +54,10 @@ _FIELD_OF_THE_RECORDING: Mapping[str, Mapping[str, Any]] = {
 
 # Variants of an estimator that its paper treats as different filters.
 _VARIANTS: Mapping[str, Sequence[Mapping[str, Any]]] = {"lee2012": ({"mode": 2}, {"mode": 3})}
+
+
+_LAGGING = plumb.LAGGED
+_AFTER = 0.5  # s; it tells of whole blocks, next to its lag
 
 
 @dataclass(frozen=True)
@@ -103,9 +109,31 @@ def offline_contenders(names: Sequence[str] = (), settings: Settings = MappingPr
     ]
 
 
+def lagging_contenders(lags: Sequence[float], settings: Settings = MappingProxyType({})) -> list[Contender]:
+    """plumb_lag, told so many seconds later, with what came since. Raises ValueError for a lag that cannot be."""
+    found = []
+    for lag in lags:
+        parameters = {**_own(_LAGGING, settings), "lag": lag}
+        _LAGGING.parameter_vector(parameters)
+        found.append(Contender(f"{_LAGGING.name} {lag:g} s", partial(_estimate_later, parameters), parameters, True))
+    return found
+
+
+def _estimate_later(
+    parameters: Mapping[str, Any], readings: Readings, sample_period: float
+) -> Mapping[str, np.ndarray]:
+    """Signals of every instant of the readings; what belongs to the last ones is told when nothing is read any more."""
+    n, more = len(readings["gyro"]), math.ceil((parameters["lag"] + _AFTER) / sample_period)
+    padded = {name: np.vstack([readings[name], np.full((more, 3), np.nan)]) for name in ("gyro", "accel")}
+    told = run(_LAGGING, padded, {"sample_period": sample_period, **parameters})
+    instants = np.round(told["sample_time"] / sample_period)
+    last = np.searchsorted(instants, np.arange(n), side="right") - 1  # row that tells of each instant
+    return {name: told[name][last] for name in ("vertical", "tilt_std")}
+
+
 def check_settings(settings: Settings) -> None:
     """Raises ValueError for an estimator or a parameter that is none, and a value that cannot be."""
-    blocks = {block.name: block for block in _of_tilt()}
+    blocks = {block.name: block for block in (*_of_tilt(), _LAGGING)}
     for key, value in settings.items():
         owner, dot, name = key.partition(".")
         if not dot:

@@ -33,6 +33,7 @@ from .contenders import (
     Readings,
     Settings,
     check_settings,
+    lagging_contenders,
     offline_contenders,
     with_magnetometer,
     with_papers_parameters,
@@ -108,6 +109,7 @@ def benchmark(
     rest: float = REST,
     starts: int = 0,
     group: str = "",
+    lags: Sequence[float] = (),
     offline: bool = False,
     settings: Settings = MappingProxyType({}),
     progress: Progress | None = None,
@@ -117,12 +119,13 @@ def benchmark(
     places: a folder, a file or a pattern, or several. group: a rule for groups (``sources``); without, a folder is one.
     delay: of the truth, s, beside no delay; None: DELAY for trials of BROAD, and none for other recordings, of whose
     clocks nothing is known. rest: how much of a recording's start is rest, s; 0 leaves the gyro as it is. starts: how
-    often to begin anew inside the motion of each recording. offline: score once more with the whole record known.
+    often to begin anew inside the motion of each recording. lags: score plumb_lag, too, told so many seconds later.
+    offline: score once more with the whole record known.
     settings: values by estimator.parameter, in place of those that it would run with. without: filters, also of others,
     to leave out. Raises ValueError for what cannot be among these, and where there is nothing to score.
     """
     check_settings(settings)
-    contests = _contests(names, settings, rest, offline, set(without))
+    contests = _contests(names, settings, rest, lags, offline, set(without))
     known = {contender.name for contest in contests for contender in contest.contenders}
     with_heading = [c for c in with_magnetometer(settings) if c.name in known or (not names and c.name not in without)]
     with_heading += [c for c in heading_peers() if c.name in known]
@@ -157,7 +160,7 @@ def benchmark(
 
 
 def _contests(
-    names: Sequence[str], settings: Settings, rest: float, offline: bool, without: set[str]
+    names: Sequence[str], settings: Settings, rest: float, lags: Sequence[float], offline: bool, without: set[str]
 ) -> list[_Contest]:
     """Who takes part in what; the second contest is the one that is judged."""
     calibrated = f", gyro bias of the first {rest:g} s removed" if rest else ""
@@ -168,6 +171,8 @@ def _contests(
         ),
         _Contest("with the speed of the wheels", with_wheels(names, settings), on_wheels=True),
     ]
+    if lags:
+        contests.append(_Contest("told later", lagging_contenders(lags, settings)))
     if offline:
         contenders = [*offline_contenders(names, settings), *offline_peers()]
         contests.append(_Contest("offline, the whole record known", contenders))

@@ -105,6 +105,9 @@ def benchmark(
     starts: Annotated[
         int, typer.Option(min=0, max=1000, help="Begin so often inside the motion of each recording, too.")
     ] = 0,
+    lags: Annotated[
+        list[float] | None, typer.Option("--lag", help="Score plumb_lag, too, told this much later (s). Repeatable.")
+    ] = None,
     offline: Annotated[
         bool, typer.Option("--offline", help="Score once more with the whole record known, beside offlineVQF.")
     ] = False,
@@ -130,7 +133,7 @@ def benchmark(
     inputs = [source.path for source in sources(places, group).files]
     check_target(csv, ".csv", inputs=inputs)
     check_target(json, ".json", inputs=inputs)
-    begin = partial(score, delay=delay, rest=rest_bias, starts=starts, group=group, offline=offline)
+    begin = partial(score, delay=delay, rest=rest_bias, starts=starts, group=group, lags=lags or (), offline=offline)
     more = f" and {len(places) - 1} more" if len(places) > 1 else ""
     with progress_bar(f"scoring {places[0]}{more}") as progress:
         result = begin(places, estimators or (), without=without or (), settings=parsed_sets(sets), progress=progress)
