@@ -261,3 +261,13 @@ def test_a_plant_whose_solution_diverges_is_refused_in_the_same_words() -> None:
         told.append(refusal(instance, lambda: instance.step(0.0, 1000.0)))  # noqa: B023
         instance.close()
     assert told[0] == told[1]
+
+
+def test_behind_the_last_variable_of_a_plant_there_is_none() -> None:
+    """A sampled block has its clock there."""
+    for kind in fmu.KINDS:
+        instance = fmu.Fmu("pendulum", kind=kind).initialise()
+        behind = max(v.valueReference for v in instance.model.modelVariables) + 1
+        for call in (lambda: instance.slave.getReal([behind]), lambda: instance.slave.setReal([behind], [0.0])):  # noqa: B023
+            assert refusal(instance, call) == f"pendulum: no variable has value reference {behind}"
+        instance.close()
