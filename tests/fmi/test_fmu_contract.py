@@ -141,6 +141,18 @@ def test_outputs_hold_between_samples_whatever_is_set(kind, name):
     instance.close()
 
 
+def test_the_outputs_of_a_plant_follow_its_inputs_at_once(kind):
+    """A torque turns the rod faster at the next instant only, but a sensor on it feels it now."""
+    instance = fmu.Fmu("pendulum", kind=kind).initialise({"motion": 0})
+    instance.step(0.0, 0.1)
+    outcomes = []
+    for torque in (0.0, 1.0, 0.0):
+        instance.set({"torque[1]": torque})
+        outcomes.append(instance.get(*(f"specific_force[{axis}]" for axis in (1, 2, 3))))
+    assert outcomes[0] == outcomes[2] != outcomes[1]
+    instance.close()
+
+
 @pytest.mark.parametrize("name", NAMES)
 def test_reset_returns_to_the_state_after_instantiation(kind, name):
     fresh = fmu.Fmu(name, kind=kind).initialise()

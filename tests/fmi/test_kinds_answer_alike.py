@@ -140,7 +140,9 @@ CALLS: dict[str, list[Call]] = {
     "whole numbers": [setup(), set_integers, enter, get_integers, leave, step(0.0), get_integers],
     "switches": [setup(), set_to(use_initial_angles=True), enter, get_switches, leave, step(0.0), get_switches],
     "a fixed parameter is set after the start": [*START, set_to(g=5.0)],
+    "the first parameter is set after the start": [*START, set_to(sample_period=0.02)],
     "an output is set": [*START, set_to(roll=1.0)],
+    "a local variable is set": [*START, lambda i: i.set({"innovation[1]": 1.0})],
     "the clock is set": [setup(), set_to(sample_time=1.0)],
     "a tunable parameter is set out of its range": [*START, set_to(sigma_a2=-1.0)],
     "a tunable parameter is set to its bounds": [*START, set_to(sigma_a2=1e-9), set_to(sigma_a2=1e6), get("sigma_a2")],
@@ -259,3 +261,13 @@ def test_a_plant_whose_solution_diverges_is_refused_in_the_same_words() -> None:
         told.append(refusal(instance, lambda: instance.step(0.0, 1000.0)))  # noqa: B023
         instance.close()
     assert told[0] == told[1]
+
+
+def test_behind_the_last_variable_of_a_plant_there_is_none() -> None:
+    """A sampled block has its clock there."""
+    for kind in fmu.KINDS:
+        instance = fmu.Fmu("pendulum", kind=kind).initialise()
+        behind = max(v.valueReference for v in instance.model.modelVariables) + 1
+        for call in (lambda: instance.slave.getReal([behind]), lambda: instance.slave.setReal([behind], [0.0])):  # noqa: B023
+            assert refusal(instance, call) == f"pendulum: no variable has value reference {behind}"
+        instance.close()

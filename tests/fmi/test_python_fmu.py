@@ -126,6 +126,20 @@ def test_an_error_in_any_function_is_survived_by_it_by_free_and_by_other_instanc
     other.close()
 
 
+def test_garbage_for_a_state_takes_no_reference_from_any_instance() -> None:
+    """The wrapper gives back one of an instance that it does not name."""
+    instances = [fmu.Fmu("lee2012").initialise() for _ in range(2)]
+    living = list(sys.modules["lee2012_fmu"].Lee2012._living)
+    before = [sys.getrefcount(slave) for slave in living]
+    with pytest.raises(FMICallException):
+        instances[0].slave.deSerializeFMUstate(b"garbage" * 30)
+    after = [sys.getrefcount(slave) for slave in living]
+    assert len(living) >= 2
+    assert all(now >= then for now, then in zip(after, before, strict=True))
+    for instance in instances:
+        instance.slave.freeInstance()
+
+
 def test_after_an_error_it_can_be_read_and_goes_on_from_a_saved_state_or_after_a_reset_only() -> None:
     """PythonFMU calls the error fatal, after which FMI lets nothing go on as if it were well."""
     instance = fmu.Fmu("lee2012").initialise()

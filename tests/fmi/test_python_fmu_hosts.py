@@ -129,6 +129,18 @@ def test_a_host_with_logging_off_reads_on_stderr_what_is_wrong_and_only_once() -
     assert done.stdout.split() == ["0", "6"]  # with logging on, each time our message and the wrapper's
 
 
+def test_a_host_without_stderr_gets_nothing_on_stdout_instead() -> None:
+    done = in_python("""if True:
+        instance = Fmu("lee2012", logging=False).initialise()
+        sys.stderr = None
+        try:
+            instance.step(0.0, -1.0)
+        except FMICallException:
+            print("refused")
+    """)
+    assert (done.returncode, done.stdout) == (0, "refused\n")
+
+
 @needs("Linux")
 def test_a_python_host_that_unloads_fmus_does_not_gather_their_wrappers_in_memory() -> None:
     """FMPy unpacks each time anew, so each time another library is loaded."""

@@ -66,7 +66,6 @@ class Component:
     def enter_initialization_mode(self) -> None:
         self._require("fmi2EnterInitializationMode", INSTANTIATED)
         self._phase = INITIALISING
-        self._stale = True
 
     def exit_initialization_mode(self) -> None:
         self._require("fmi2ExitInitializationMode", INITIALISING)
