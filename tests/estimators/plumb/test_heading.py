@@ -14,7 +14,7 @@ from imufmu.compiled.running import run
 from imufmu.scoring.metrics import heading_error
 from support import motions
 from support.motions import FIELD_N, Motion
-from support.plumb_motions import BLOCK, G, consumer, moving, rms
+from support.plumb_motions import BLOCK, DEFAULTS, G, consumer, moving, rms
 
 YAW = 2.0  # rad, of the sensor at the start
 BIAS = np.array([0.0, 0.0, 0.01])  # rad/s: yaw drifts by half a degree per second where the bias is not known
@@ -164,3 +164,35 @@ def test_a_start_that_turns_out_upside_down_does_not_spoil_the_heading(seed: int
     readings["accel"][0] *= [1, -1, -1]
     result = run(BLOCK, readings, {"sample_period": motion.dt, "g": G})
     assert np.abs(yaw_error_deg(motion, result))[200:].max() < 5
+
+
+def test_one_reading_after_a_long_silence_is_not_believed_blindly(hand: Motion) -> None:
+    """It stands for a second, though it is the only one in twenty."""
+    mag = field(hand)
+    mag[3000:5003], mag[5004:] = math.nan, math.nan
+    std = with_mag(hand, mag)["yaw_offset_std"]
+    grown = DEFAULTS["s_d"] ** 2 * 20
+    expected = 1 / math.sqrt(1 / grown + 1 / DEFAULTS["s_h"] ** 2)
+    assert std[5006] > 0.9 * expected  # the deviation of the field makes it larger
+
+
+def test_a_field_that_is_a_little_off_turns_the_heading_slowly(hand: Motion) -> None:
+    """By 3 uT for five seconds, too little to be left out: North seems to lie 6 deg elsewhere."""
+    rows = ((np.arange(len(hand.mag)) >= 5000) & (np.arange(len(hand.mag)) < 5500))[:, None]
+    mag = field(hand, rows * np.array([2.2, 2.0, 0.0]))
+    careful, rash = (np.abs(yaw_error_deg(hand, with_mag(hand, mag, **p))) for p in ({}, {"k_h": 0.0}))
+    assert rash[5499] > 2
+    assert careful[5499] < 0.6 * rash[5499]
+
+
+def test_the_noise_of_single_readings_is_no_deviation_of_the_field(hand: Motion) -> None:
+    """With the field that tells it low-passed the heading is known better; a mean of two halves the noise's square."""
+    low_passed, single = (with_mag(hand, field(hand), t_h=t_h)["yaw_offset_std"][-1] for t_h in (0.05, 0.0))
+    assert low_passed < 0.9 * single
+
+
+def test_where_the_field_is_another_for_good_the_heading_goes_there_at_once(hand: Motion) -> None:
+    rows = np.arange(len(hand.mag))[:, None] >= 3000
+    result = with_mag(hand, field(hand, rows * np.array([20.0, 0.0, 0.0])))
+    accepted = np.flatnonzero((result["status"][3000:].astype(int) & Status.MAG_REJECTED) == 0)[10] + 3000
+    assert abs(yaw_error_deg(hand, result)[accepted + 100] - 45) < 5
