@@ -132,6 +132,7 @@ def reset(i: fmu.Fmu) -> Any:
 
 START = [setup(), enter, leave, step(0.0)]
 LATE = [setup(2.0), enter, leave, set_input(math.nan), step(2.0)]
+DATED = [setup(1.7e9), enter, leave]  # seconds since 1970
 FAR = 2**31
 
 # Each list of calls up to one that is refused, or that only warns, and what follows a reset.
@@ -201,6 +202,7 @@ CALLS: dict[str, list[Call]] = {
         set_to(P0=math.nan),
         get("tilt_std"),
     ],
+    "a gap in time far from zero": [*DATED, step(1.7e9, 0.01), step(1.7e9 + 0.05, 0.01), get("sample_time")],
     "a reset forgets the start and what was missing": [*LATE, reset, enter, get("sample_time"), leave, *LATE[-2:]],
     "a reset": [*START, set_input(1.0), step(0.01), reset, *START, get("roll", "g", "sample_time")],
 }
@@ -244,7 +246,7 @@ def test_what_is_wrong_is_refused_and_nothing_else() -> None:
         "a reset",
     }
     well |= {"an input is not a number", "an input is infinite", "a get during initialisation, nothing set"}
-    well |= {"outputs stay while a parameter is out of range"}
+    well |= {"a gap in time far from zero", "outputs stay while a parameter is out of range"}
     well |= {"a tunable parameter is set to its bounds", "a reset forgets the start and what was missing"}
     for name, calls in CALLS.items():
         instance = fmu.Fmu("lee2012", kind="native")
@@ -271,3 +273,17 @@ def test_behind_the_last_variable_of_a_plant_there_is_none() -> None:
         for call in (lambda: instance.slave.getReal([behind]), lambda: instance.slave.setReal([behind], [0.0])):  # noqa: B023
             assert refusal(instance, call) == f"pendulum: no variable has value reference {behind}"
         instance.close()
+
+
+def test_a_block_that_tells_no_status_takes_inputs_out_of_their_declared_bounds_without_a_word() -> None:
+    """It could not say that it takes them for missing."""
+    readings = []
+    for kind in fmu.KINDS:
+        instance = fmu.Fmu("imu", kind=kind).initialise()
+        beyond = 2 * float(instance.variables["angular_velocity[1]"].max)
+        instance.set({"angular_velocity[1]": beyond})
+        instance.step(0.0, 0.01)
+        readings.append(instance.get("gyro[1]"))
+        assert instance.log == []
+        instance.close()
+    assert readings[0] == readings[1] != [0.0]

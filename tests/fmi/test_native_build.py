@@ -7,6 +7,7 @@ import shutil
 import struct
 import subprocess
 import zipfile
+from dataclasses import replace
 from pathlib import Path
 
 import fmpy
@@ -17,7 +18,7 @@ import pytest
 
 from imufmu.compiled import compilers
 from imufmu.compiled.compilers import PLATFORMS, own_platform, universal
-from imufmu.fmi import native
+from imufmu.fmi import native, native_table
 from imufmu.fmi.build import BuildError, build_fmu
 from imufmu.fmi.model_description import guid
 from imufmu.fmi.native import block_called, build_native, cached_native_fmu, sources
@@ -188,6 +189,14 @@ def test_a_library_exports_the_fmi_functions_and_needs_the_c_library_only(name: 
     needed = subprocess.run(["objdump", "-p", str(library)], capture_output=True, text=True).stdout
     libraries = {line.split()[1] for line in needed.splitlines() if "NEEDED" in line}
     assert libraries == {"libc.so.6", "libm.so.6"}
+
+
+def test_numbers_of_the_table_read_back_as_the_same_doubles() -> None:
+    odd = replace(BLOCKS["lee2012"].own_parameters[1], start=1 / 3, minimum=-1 / 7, maximum=1e300 / 3, kind="real")
+    block = replace(BLOCKS["lee2012"], own_parameters=(odd,))
+    (variable,) = (v for v in block.variables if v.signal is odd)
+    row = native_table._row(block, variable)
+    assert [float(row[name]) for name in ("start", "minimum", "maximum")] == [1 / 3, -1 / 7, 1e300 / 3]
 
 
 # Compilers and platforms

@@ -16,6 +16,7 @@ from fmpy.fmi1 import FMICallException
 from imufmu.fmi import runtime
 from imufmu.fmi.build import cached_fmu
 from imufmu.fmi.component import Component
+from imufmu.fmi.slave import Refused
 from support import fmu
 
 
@@ -91,6 +92,7 @@ def test_a_percent_sign_in_a_message_arrives_as_it_is():
     slave = sys.modules["lee2012_fmu"].Lee2012(instance_name="i", resources=f"{fmu.unpacked('lee2012')}/resources")
     slave.log("5% of %s")
     assert slave.log_queue[-1].msg % () == "5% of %s"
+    assert repr(Refused("5% of %s")) % () == "5% of %s"
     instance.slave.freeInstance()
 
 

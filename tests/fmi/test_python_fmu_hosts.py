@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+import imufmu
 from imufmu.compiled.compilers import compile_program
 from imufmu.files.locations import fmu_src_folder
 from support import c_host, fmu
@@ -154,9 +155,9 @@ def test_a_python_host_that_unloads_fmus_does_not_gather_their_wrappers_in_memor
     assert len(set(done.stdout.split())) == 1
 
 
-def test_the_path_of_a_python_host_does_not_grow() -> None:
-    before = list(sys.path)
+def test_the_paths_of_a_python_host_and_of_its_own_imufmu_do_not_grow() -> None:
+    before = [*sys.path, *imufmu.__path__]
     for _ in range(5):
         fmu.Fmu("lee2012").initialise().close()
         fmu.Fmu("imu").initialise().close()
-    assert sys.path == before
+    assert [*sys.path, *imufmu.__path__] == before
