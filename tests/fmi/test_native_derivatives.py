@@ -69,6 +69,22 @@ def test_the_derivative_of_a_sampled_block_is_at_the_inputs_of_its_last_sample()
     instance.close()
 
 
+def test_the_inputs_of_the_last_sample_are_no_older_ones() -> None:
+    """An instance that had them from its initialisation on answers alike."""
+    readings, answers = {"gyro[1]": 0.3, "accel[2]": 2.0}, []
+    for from_the_start in (True, False):
+        instance = native()
+        enter(instance)
+        instance.set(readings if from_the_start else {})
+        leave(instance)
+        instance.set(readings)
+        for k in range(3):
+            instance.step(0.01 * k, 0.01)
+        answers.append(derivative(instance, "roll", "accel[3]"))
+        instance.close()
+    assert answers[0] == answers[1] != 0
+
+
 def test_an_input_that_is_named_twice_changes_by_the_sum() -> None:
     instance = native().initialise()
     instance.step(0.0, 0.01)
