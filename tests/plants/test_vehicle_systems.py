@@ -51,8 +51,8 @@ def test_every_estimator_reads_the_same_imu_and_only_plumb_the_wheels(system: st
     assert {"plant", "imu", "plumb", *WITHOUT_WHEELS} == {component.name for component in described.components}
     readings = [f"{sensor}[{i}]" for sensor in ("gyro", "accel") for i in (1, 2, 3)]
     for estimator in ("plumb", *WITHOUT_WHEELS):
-        fed = {c.end[1]: c.start for c in described.connections if c.end[0] == estimator}
-        assert {name: ("imu", name) for name in readings}.items() <= fed.items()
+        fed = {c.end.connector: str(c.start) for c in described.connections if c.end.element == estimator}
+        assert {name: f"imu.{name}" for name in readings}.items() <= fed.items()
         assert ("forward_speed" in fed) == (estimator == "plumb")
 
 
