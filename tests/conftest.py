@@ -20,6 +20,8 @@ from support.places import SHARED
 
 __all__ = ["broad"]  # a fixture of every test
 
+SLOW_TO_COMPILE = "plumb_lag"  # a compiler works half a minute on its C, which is that of plumb and more
+
 
 def pytest_configure(config: pytest.Config) -> None:
     """Make one folder for all workers of this run; the process that starts them deletes it at the end."""
@@ -33,6 +35,8 @@ def pytest_configure(config: pytest.Config) -> None:
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Mark tests that read recordings, to be run once more without any; long tests first, lest workers wait for one."""
     for item in items:
+        if SLOW_TO_COMPILE in item.name and ("native" in item.name or "compiled" in item.nodeid):
+            item.add_marker("slow")
         if RECORDING_FIXTURES & set(getattr(item, "fixturenames", ())):
             item.add_marker("recordings")
     items.sort(key=lambda item: item.get_closest_marker("long") is None)

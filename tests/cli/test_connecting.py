@@ -98,8 +98,8 @@ def test_what_is_unclear_is_asked_at_a_terminal_by_number(monkeypatch: pytest.Mo
 
 
 def test_a_device_is_baked_into_a_compiled_fmu(imufmu, tmp_path: Path) -> None:
-    assert imufmu("build", "imu+plumb", "--native", "--imu", "mpu9150")[0] == 0
-    code, text, _ = imufmu("info", tmp_path / "imu_plumb.fmu")
+    assert imufmu("build", "imu+lee2012", "--native", "--imu", "mpu9150")[0] == 0
+    code, text, _ = imufmu("info", tmp_path / "imu_lee2012.fmu")
     assert code == 0
     assert re.search(r"^imu\.gyro_bias\[1\] .* -0\.01745329 ", text, re.MULTILINE)
     assert re.search(r"^sample_period .* 0\.005 ", text, re.MULTILINE)

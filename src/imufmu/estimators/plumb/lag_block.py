@@ -1,7 +1,7 @@
 """The block ``plumb_lag``: ``plumb`` with the nodes of ``lag`` behind it, and what it tells of one of them.
 
-The equations of plumb stand in ``filter`` and what it names: ``readings``, ``start``, ``rest``, ``travel``, ``block_end``,
-``covariance``, ``vehicle`` and ``heading``; those that look back in ``lag`` and ``smoother``.
+The equations of plumb stand in ``filter`` and what it names: ``readings``, ``start``, ``rest``, ``travel``,
+``block_end``, ``covariance``, ``vehicle`` and ``heading``; those that look back in ``lag`` and ``smoother``.
 """
 
 from __future__ import annotations
