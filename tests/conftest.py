@@ -36,7 +36,7 @@ def pytest_configure(config: pytest.Config) -> None:
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Mark tests that read recordings, to be run once more without any; long tests first, lest workers wait for one."""
     for item in items:
-        if SLOW_TO_COMPILE in item.name and re.search("native|compiled", item.nodeid):
+        if SLOW_TO_COMPILE in item.name and re.search("native|compiled|at_its_bounds", item.nodeid):
             item.add_marker("slow")
         if RECORDING_FIXTURES & set(getattr(item, "fixturenames", ())):
             item.add_marker("recordings")
