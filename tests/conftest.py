@@ -21,7 +21,9 @@ from support.places import SHARED
 
 __all__ = ["broad"]  # a fixture of every test
 
-SLOW_TO_COMPILE = "plumb_lag"  # a compiler works half a minute on its C, which is that of plumb and more
+# A compiler works half a minute on its C, and each of its samples moves 7300 numbers. It is plumb and what looks back,
+# so by default it is run in process only.
+SLOW_TO_COMPILE = "plumb_lag"
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -36,7 +38,7 @@ def pytest_configure(config: pytest.Config) -> None:
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Mark tests that read recordings, to be run once more without any; long tests first, lest workers wait for one."""
     for item in items:
-        if SLOW_TO_COMPILE in item.name and re.search("native|compiled|at_its_bounds", item.nodeid):
+        if SLOW_TO_COMPILE in item.name and re.search("tests/fmi|native|python|compiled|at_its_bounds", item.nodeid):
             item.add_marker("slow")
         if RECORDING_FIXTURES & set(getattr(item, "fixturenames", ())):
             item.add_marker("recordings")

@@ -143,6 +143,7 @@ def test_the_whole_record_known_is_a_contest_of_its_own(data: Path) -> None:
     assert "plumb offline" not in {s.contender for s in benchmark(data / "walk", ["plumb"]).scores}
 
 
+@pytest.mark.slow
 def test_a_filter_that_lags_is_scored_for_the_instants_that_it_tells_of(tmp_path: Path) -> None:
     """Rocking at 1.5 rad/s, where a lag of half a second that counted as error would be tens of degrees."""
     time = np.arange(1200) * PERIOD

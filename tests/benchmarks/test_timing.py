@@ -39,7 +39,7 @@ def device(folder: Path, gyro_index: int, count: int = 3) -> Path:
     return folder
 
 
-@pytest.mark.parametrize("gyro_index", [1, 2])
+@pytest.mark.parametrize("gyro_index", [pytest.param(1, marks=pytest.mark.slow), 2])
 def test_several_recordings_tell_whether_rates_are_means_or_instants(gyro_index: int, tmp_path: Path) -> None:
     result = device_timing(device(tmp_path / "d", gyro_index))
     assert result.gyro_index == gyro_index

@@ -23,7 +23,10 @@ def told_of(result, vertical: np.ndarray, dt: float = DT) -> tuple[np.ndarray, n
     return np.rad2deg(angle(result["vertical"], vertical[rows])), rows
 
 
-@pytest.mark.parametrize(("dt", "wanted"), [(0.01, 0.5), (0.01, 1.99), (0.0035, 2.0), (0.001, 0.3), (0.034, 2.0)])
+LONG = pytest.param(0.0035, 2.0, marks=pytest.mark.slow)
+
+
+@pytest.mark.parametrize(("dt", "wanted"), [(0.01, 0.5), (0.01, 1.99), LONG, (0.001, 0.3), (0.034, 2.0)])
 def test_it_is_late_by_whole_blocks_and_says_so(dt: float, wanted: float) -> None:
     """At 1000 Hz there are 16 attitudes kept of a block of 50: one for four samples."""
     motion = moving(70, 4.0, dt=dt)
