@@ -11,6 +11,7 @@ import pytest
 
 from imufmu.cosim.results import read_hdf5
 from imufmu.files.csv_table import write_csv
+from support.cosim_stubs import stub
 from support.optional import skip_without
 from support.rocking import lines_of, rocking
 
@@ -67,6 +68,14 @@ def test_what_holds_for_one_of_several_is_told_with_its_name(imufmu, tmp_path):
     write_csv(tmp_path / "walk.csv", READINGS)
     code, _, errors = imufmu("replay", "walk.csv", "-e", "lee2012", "-e", "rizun2008", "--set", "cutoff=0.5")
     assert code == 2 and "cutoff" in errors and "lee2012" in errors
+
+
+def test_the_figure_of_an_fmu_without_an_attitude_has_its_outputs(imufmu, tmp_path):
+    write_csv(tmp_path / "walk.csv", READINGS)
+    code, _, errors = imufmu("replay", "walk.csv", "-e", stub("echo"), "--plot")
+    assert code == 0, errors
+    (figure,) = tmp_path.glob("walk_*.png")  # the FMU calls itself by the name of its class
+    assert figure.read_bytes().startswith(b"\x89PNG")
 
 
 def test_without_a_truth_a_comparison_tells_how_far_estimators_are_apart(imufmu, tmp_path):

@@ -83,6 +83,17 @@ def test_share_nees_settling_and_finite_say_what_their_names_do(table: Table) ->
     assert found(table, quantity="plumb.tilt", statistic="finite").holds
 
 
+def test_rows_that_repeat_a_sample_have_no_error_of_their_own() -> None:
+    """An estimator of every second row: its outputs are held, and the error is that of its samples."""
+    lean = np.radians(np.repeat(np.arange(0, N + 1, 2), 2)[:N] / 10)
+    columns = {"plumb.sample_time": np.repeat(TIME[::2], 2)[:N]}
+    for i, (true, held) in enumerate(zip((0.0, 0.0, 1.0), (0 * lean, np.sin(lean), np.cos(lean)), strict=True), 1):
+        columns |= {f"plant.vertical[{i}]": np.full(N, true), f"plumb.vertical[{i}]": held}
+    table = Table(Result("made", TIME, columns, dict.fromkeys(columns, "1")))
+    finding = found(table, quantity="plumb.tilt", statistic="mean", at_most="20 deg")
+    assert finding.value == pytest.approx(np.mean(np.arange(0, N, 2) / 10))
+
+
 def test_always_eventually_and_when(table: Table) -> None:
     assert found(table, always="plumb.tilt < 10.5 deg").holds
     always = found(table, always="plumb.tilt < 9 deg")

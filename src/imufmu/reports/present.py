@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from matplotlib.figure import Figure
 
 from ..blocks.running import Trajectory
 from ..cosim.replay import Replay
@@ -116,18 +117,23 @@ def present_replays(replays: Sequence[Replay], figure: Path | None = None) -> tu
         except ValueError as error:
             notes.append(f"{replay.estimator} is not compared with the truth: {error}")
     if figure:
-        drawn = attitude_figure(
-            recording.name,
-            Trajectory(recording.time, truth) if truth else None,
-            {replay.estimator: Trajectory(recording.time, replay.signals()) for replay in replays},
-            {name: (recording.time[scored], found) for name, found in errors.items()},
-        )
-        save(drawn, figure)
+        save(_drawn(replays, {name: (recording.time[scored], found) for name, found in errors.items()}), figure)
     if figures:
         return summary_table("estimator", figures), notes
     if len(replays) > 1:
         return _apart_table(replays), notes
     return range_table(replays[0].columns, replays[0].units), notes
+
+
+def _drawn(replays: Sequence[Replay], errors: Mapping[str, tuple[np.ndarray, Mapping[str, np.ndarray]]]) -> Figure:
+    """Attitude and acceleration, or all outputs of the first FMU where none tells of either."""
+    recording, truth = replays[0].recording, replays[0].truth()
+    estimates = {replay.estimator: Trajectory(recording.time, replay.signals()) for replay in replays}
+    told = {name for estimate in estimates.values() for name in estimate.values}
+    if not errors and not told & {"roll", "pitch", "external_acceleration"}:
+        outputs: Figure = replays[0].plot(*replays[0].columns)
+        return outputs
+    return attitude_figure(recording.name, Trajectory(recording.time, truth) if truth else None, estimates, errors)
 
 
 def _apart_table(replays: Sequence[Replay]) -> Table:
